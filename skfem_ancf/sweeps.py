@@ -51,6 +51,13 @@ class Sweep:
     failures : list of Failure
         The members that failed, among them those whose values differ in names or shapes from those
         of the first.
+
+    Examples
+    --------
+    >>> from skfem_ancf import sweep
+    >>> result = sweep(lambda x: x, {"x": [1.0, 2.0]}, lambda x: {"square": x**2})
+    >>> result["square"], result["x"], result.failures
+    (array([1., 4.]), array([1., 2.]), [])
     """
 
     parameters: dict[str, Array]

@@ -231,6 +231,18 @@ class History(MaterialPoints, SpringForces):
         ----------
         boundary, beam
             As for :meth:`State.reactions <skfem_ancf.results.State.reactions>`.
+
+        Examples
+        --------
+        The reaction of the pin of a pendulum:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 1], height=0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(E=2e11, nu=0.3, density=1e4), width=0.01)
+        >>> history = Scene(beam).pin("left").gravity((0, -8)).integrate(t_end=0.01, dt=1e-3)
+        >>> history.reactions("left").force.shape
+        (11, 2)
         """
         force, moment, names = zip(*(state.reactions(boundary, beam) for state in self))
         return Reaction(np.array(force), np.array(moment),
@@ -322,6 +334,16 @@ class History(MaterialPoints, SpringForces):
             As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
         subdivide, filename, dpi, recover, scale, loads, supports
             As there.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamCable(),
+        ...             StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.01)
+        >>> history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.1, 0.01)
+        >>> history.plot("displacement", times=[0, 0.05, 0.1]).get_xlabel()
+        'x'
         """
         if not len(self):
             raise InputError("the history has no instants")

@@ -58,7 +58,13 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
 
     Examples
     --------
-    ``meshio.Mesh(*body_fields(state))``
+    >>> import meshio, numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.io import body_fields
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> meshio.Mesh(*body_fields(Scene(beam).state())).points.shape  # 4 x 8 x 4 quads
+    (165, 3)
     """
     wanted, undeformed = find_fields(fields, state.beams), require_flag("undeformed", undeformed)
     found = grids(state, subdivide, lagrange, recover)
@@ -134,7 +140,14 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
 
     Examples
     --------
-    ``state.save("beam.vtu", fields=["displacement", "S_xx"])``
+    >>> import numpy as np, tempfile
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     print(state.save(f"{folder}/beam.vtu").name)
+    beam.vtu
     """
     path = require_path("filename", filename, SUFFIXES)
     return _save(state, path, subdivide, lagrange, undeformed, recover, fields, precision)[0]

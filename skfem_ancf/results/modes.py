@@ -71,6 +71,17 @@ class Modes(NearMisses):
         ``shape . D shape / (2 omega)`` with the damping matrix D: exact for Rayleigh and modal
         damping and for viscoelastic materials of one kind, of first order where damping couples
         modes. NaN where a motion does not oscillate.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Scene,
+        ...                         StVenantKirchhoff)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, damping=KelvinVoigt(1e-3))
+        >>> modes = Scene(beam).clamp("left").modes(2)
+        >>> bool(np.allclose(modes.damping_ratios, 0.5e-3 * modes.frequencies))
+        True
         """
         state, system = self.state, self.state.system
         if not system.damped:

@@ -188,6 +188,16 @@ class SpringForces:
         spring
             One of ``scene.elements``, or its number among the springs and torsional springs of the
             scene, in the order in which they were added.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5),
+        ...             StVenantKirchhoff(1e9, 0.3), width=0.1)
+        >>> scene = Scene(beam).pin("left").spring(100.0, ((1, 0), (1, 1)), length=0.9)
+        >>> state = scene.line_load((0, -20.0)).solve_static()
+        >>> round(state.spring_force(), 2)
+        10.0
         """
         found, base = spring_of(self.system.forces.elements, spring), self.base
 
@@ -482,6 +492,16 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
         """Any field at material points, () or (n,); components of vectors and tensors come first.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.1), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+        >>> state = Scene(beam).clamp("left").point_force((0, -0.1), at=(1, 0)).solve_static()
+        >>> float(state.field("von_mises", (0.5, 0.05)).round(-1))
+        300.0
         """
         found = find_field(field)
         return self._at_points(lambda part: found.of(self._values(part, recover)), point, beam,

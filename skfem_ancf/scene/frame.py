@@ -245,6 +245,17 @@ class Frame(Scene):
             Unit of length of the frame, as "m" or "mm": coordinates of a drawing in DXF are
             converted to it from the unit that the drawing states. By default all coordinates are
             taken as they are.
+
+        Examples
+        --------
+        >>> import meshio
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> mesh = meshio.Mesh([[0, 0], [0, 1], [1, 1]], [("line", [[0, 1], [1, 2]])],
+        ...                    cell_sets={"column": [[0]], "girder": [[1]]})
+        >>> frame = Frame.from_meshio(mesh, material=StVenantKirchhoff(E=2e11, nu=0.3), height=0.1,
+        ...                           width=0.1)
+        >>> [beam.name for beam in frame.beams]
+        ['column', 'girder']
         """
         named = list(mapping_of("sections", sections))
         beam = dict(height=height, material=material, width=width, section=section, element=element,
@@ -356,6 +367,17 @@ class Frame(Scene):
             Displacement from the reference configuration; rotation in radians, counterclockwise: a
             number, proportional to the load factor of a static solution; or a function of time, in
             statics of the load factor.
+
+        Examples
+        --------
+        Settlement w of a clamp of a girder, E I = 1, causes the shear force 12 E I w / L^3:
+
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], height=0.01, width=0.01,
+        ...                          material=StVenantKirchhoff(12e8, 0.3))
+        >>> state = frame.clamp([0, 1]).settle(1, y=-1e-4).solve_static()
+        >>> round(float(state.reactions(0).force[1]), 6)
+        0.0012
         """
         given = {name: value for name, value in zip(COMPONENTS, (x, y, angle)) if value is not None}
         if not given:

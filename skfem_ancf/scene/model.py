@@ -195,6 +195,17 @@ class Model(NearMisses):
         item
             An :class:`~skfem_ancf.Item`, as ``PointForce((0, -1e-3), at=(1, 0))``. The scene binds
             a copy to its beams, again for every other mesh, as in ``solve_static(adapt=...)``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, Clamp, ElementBeamANCF, MeshBeam, PointForce, Scene
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3), width=0.01))
+        >>> state = scene.add(Clamp("left")).add(PointForce((0, -1e-3), at=(1, 0))).solve_static()
+        >>> state.converged
+        True
         """
         self._put(item)
         return self
@@ -208,6 +219,14 @@ class Model(NearMisses):
         ----------
         force, length
             As "N" and "mm", with stresses in MPa; other units give a compound, as "lbf/in²".
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line([0, 500, 1000], height=10), ElementBeamANCF(2),
+        ...                    StVenantKirchhoff(E=2.1e5, nu=0.3), width=10)).units("N", "mm")
+        >>> state = scene.clamp("left").point_force((0, -5), at=(1000, 0)).solve_static()
+        >>> ax = state.plot("S_xx")                                 # $S_{xx}$ (MPa)
         """
         for name, value in (("force", force), ("length", length)):
             if not require_text(name, value) or value in OTHER[name]:

@@ -275,6 +275,15 @@ class Scene(Model):
         ----------
         kind
             "static", "linear" or "dynamic".
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], height=0.01), ElementBeamANCF(2),
+        ...                    StVenantKirchhoff(2e8, 0.0, 7800), width=0.01))
+        >>> plan = scene.clamp("left").gravity((0, -9.81)).plan()
+        >>> print(plan["linear solver"])
+        banded Cholesky, half bandwidth 15
         """
         with self._lock:
             return make_plan(self.system, kind)
@@ -435,6 +444,15 @@ class Scene(Model):
             Lagrange multipliers of the joints, shape (m,); zero by default.
         load
             Load factor, for modes about the state and its reactions.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], height=0.1), ElementBeamANCF(1),
+        ...                    StVenantKirchhoff(E=1.0, nu=0.3), width=0.1))
+        >>> scene.state(np.tile([0.0, 0.2, 0, 0, 0, 0], 3)).displacement((1, 0)).round(6).tolist()
+        [0.0, 0.2]
         """
         system = self.system
         u = np.zeros(system.N) if u is None else np.array(require_finite("u", u, (system.N,)))
@@ -556,6 +574,18 @@ class Scene(Model):
         modes
             Superpose this number of lowest modes and the static response of all others; by default
             the response is direct, one factorisation for each frequency.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, PointForce,
+        ...                         Scene, StVenantKirchhoff)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, damping=KelvinVoigt(1e-3))
+        >>> scene = Scene(beam).clamp("left").sensor("tip", "displacement", at=(1, 0))
+        >>> response = scene.frequency_response([0.0, 3.0], [PointForce((0, 1), at=(1, 0))])
+        >>> float(response.of("tip 1")[0].real.round(4))                    # 4 L^3 / (E b h^3)
+        2.0
         """
         return self.linearize(about, inputs, outputs).frequency_response(frequencies, modes)
 
@@ -747,6 +777,17 @@ class Scene(Model):
             Its name; a second sensor of the same name replaces the first.
         what, at, beam, recover, line
             As for :class:`~skfem_ancf.dynamics.sensors.Sensor`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01))
+        >>> scene = scene.pin("left").gravity((0, -9.81)).sensor("tip", "position", at=(1, 0))
+        >>> history = scene.integrate(t_end=0.02, dt=1e-3, t_eval=[0.02])
+        >>> len(history), history.sensors["tip"].shape, history.sensors.t.shape
+        (1, (21, 2), (21,))
         """
         if require_label("name", name) is None:
             raise InputError("the name of a sensor must be a text, got None")
@@ -854,6 +895,20 @@ class Scene(Model):
         CheckpointError
             If the file cannot be read, is damaged, or is of other beams, bodies or meshes. Loads,
             materials and joints are not compared.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01))
+        >>> scene = scene.pin("left").gravity((0, -9.81))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     history = scene.integrate(0.02, 1e-3, checkpoint=folder + "/run.npz", every=5)
+        ...     again = scene.resume(folder + "/run.npz")
+        >>> bool(np.array_equal(again.u, history.u))
+        True
         """
         return follow(*resume(self.system, path, scheme, self._located()), progress)
 
@@ -872,6 +927,17 @@ class Scene(Model):
         -------
         Modes
             A ModelWarning says if the mesh is coarse for a frequency: an estimated error above 3 %.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01),
+        ...                    ElementBeamANCF(3), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01))
+        >>> EI, rhoA = 2e8 * 0.01**4 / 12, 7800 * 0.01**2
+        >>> ratio = scene.clamp("left").modes(1).frequencies[0] / (3.5160 * np.sqrt(EI / rhoA))
+        >>> bool(abs(ratio - 1) < 5e-3)
+        True
         """
         with self._lock:
             start = self.state(load=0.0) if state is None else configuration(self.system, state)
@@ -895,6 +961,29 @@ class Scene(Model):
             loads of this scene, added to it. It may be one of a scene with the same beams, supports
             and joints and other loads. By default the equilibrium without loads, in which
             prestressed springs act, and energies with ``scaled=False``.
+
+        Raises
+        ------
+        InputError
+            If there is no positive factor, or loads without a potential cause flutter first; if the
+            state is unstable or has other supports.
+        SupportError
+            If a rigid motion is not constrained.
+
+        Examples
+        --------
+        A cantilever column with a dead load of 40 % of Euler's load carries 60 % more:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, PointForce, Scene
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> column = Scene(Beam(MeshBeam.init_line([0, 1, 2], 0.01), ElementBeamCable(5),
+        ...                     StVenantKirchhoff(12e6, 0.3), width=1.0)).clamp("left")
+        >>> euler = np.pi**2 / 16
+        >>> dead = column.replace(loads=[PointForce((-0.4 * euler, 0), at=(2, 0))]).solve_static()
+        >>> live = column.replace(loads=[PointForce((-euler, 0), at=(2, 0))])
+        >>> live.buckling(1, dead).factors.round(3).tolist()
+        [0.6]
 
         Raises
         ------
