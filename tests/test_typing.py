@@ -13,8 +13,8 @@ import skfem_ancf
 OWNERS = ["Scene", "Frame", "State", "History", "StepHistory", "Path", "Modes", "Buckling", "Beam",
           "MeshBeam", "Resultants"]
 #: Options by any name: changes of what is copied, arguments of a joint that is named, of
-#: matplotlib's lines, and what scikit-fem's own meshes take.
-OPEN = {"replace", "joint", "plot_curve", "draw", "save", "load"}
+#: matplotlib's lines, what scikit-fem's own meshes take, and what is refused with any arguments.
+OPEN = {"replace", "joint", "plot_curve", "draw", "save", "load", "mirrored", "morphed", "smoothed"}
 
 
 def methods(owner):
