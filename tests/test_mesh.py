@@ -375,6 +375,7 @@ def test_bad_direct_construction(p, t, message):
     (lambda m: m.element_finder()(np.array([np.nan]), np.array([0.0])), "the points has a value"),
     (lambda m: m.with_sections("quadratic"), "known: 'linear', 'cubic'"),
     (lambda m: MeshBeam.from_mesh(m), "height must be a number"),
+    (lambda m: MeshBeam.init_line([0, 1, 2], height=[0.1, 0.2, 0.1]), "np.interp"),
 ])
 def test_refused(action, message):
     with pytest.raises(AncfError, match=message):

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from skfem.mapping import Mapping
 
-from ..core.errors import MeshError, ask_array, require_function, require_positive
+from ..core.errors import (InputError, MeshError, ask_array, require_function, require_positive,
+                           shown)
 from ..core.immutable import cached_property
 from ..core.quadrature import hermite_basis, lagrange
 from ..core.types import Array
@@ -36,6 +37,10 @@ def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
 def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:
     """Largest height, heights (4, ne) in the elements, and the function; None for a number."""
     if not callable(height):
+        if np.ndim(height) > 0:
+            raise InputError("height is a number, or a function of parameters (n,), got "
+                             f"{shown(height)}: for heights at nodes, height=lambda x: "
+                             "np.interp(x, nodes, heights)")
         return require_positive("height", height), None, None
     require_function("height", height, "of parameters (n,) that returns heights (n,)")
     a, b = s[t]
