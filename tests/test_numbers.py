@@ -1,6 +1,7 @@
 """Sections given by numbers are the geometrically exact beam, on an independent code."""
 
 import exact
+import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -90,3 +91,19 @@ def test_user_defined_sections_of_higher_order_are_refused():
     stiff = Section.numbers(EA=1e4, EI=1.0)
     assert rod(ElementBeamCable(5), 4, stiff).element.order == 0
     assert rod("auto", 4).element.order == 1
+
+
+def test_stiffnesses_alone_have_no_stress(tmp_path):
+    """Fields are NaN, pictures say what is missing; what is known is drawn and written."""
+    bare = rod(ElementBeamCable(5), 8, Section.numbers(EA=1e5, EI=2.0))
+    state = Scene(bare).clamp("left").point_force((0, -0.1), at="right").solve_static()
+    assert np.all(np.isnan(state.stress((0.5, 0.0)))) and np.isnan(state.field("S_xx", (0.5, 0.0)))
+    assert np.isnan(state.field("von_mises", (0.5, 0.0))) and "no stress" in state.recovered[0]
+    assert np.all(np.isfinite(state.strain((0.5, 0.0))))
+    with pytest.raises(InputError, match="sections with a shape; state.resultants"):
+        state.plot("von_mises")
+    with pytest.raises(InputError, match="sections with a shape"):
+        state.extremes("S_xx")
+    assert state.plot().get_title(loc="left")
+    saved = meshio.read(state.save(tmp_path / "bare.vtu")).point_data
+    assert np.all(np.isnan(saved["von_mises"])) and np.all(np.isfinite(saved["displacement"]))

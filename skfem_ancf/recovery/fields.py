@@ -198,8 +198,15 @@ class Values(Mapping):
     def _remembers(self):
         return remembers(self.beam)
 
+    @property
+    def _shapeless(self):
+        """True for a section of which only stiffnesses are known: it has no stress."""
+        return not self.beam.section.has_fields
+
     @cached_property
     def S(self) -> Array:
+        if self._shapeless:
+            return np.full((3, self.n), np.nan)
         return first_order(self._stress) if self._recovery is None else (
             self._recovery.at(self._part.e, self._part.X, slice(3, 6)))
 
@@ -312,6 +319,8 @@ class Values(Mapping):
     @cached_property
     def sigma(self) -> Array:
         """Cauchy stress F S F^T / J (sigma_xx, sigma_yy, sigma_xy), global axes, (3, n)."""
+        if self._shapeless:
+            return np.full((3, self.n), np.nan)
         F, S, volume = (self.frame if self._small else self.F), self.S, self._volume
         if np.iscomplexobj(self._u) and not self._small:
             F, S = self._gradient, self._stress
@@ -520,7 +529,9 @@ def no_value(field: Field) -> InputError:
     """The error for a field that is NaN all over a scene."""
     return InputError(f"the field {field.name!r} has no value anywhere in this scene" + (
         ": give a material its strength, as StVenantKirchhoff(..., strength=235e6)"
-        if field.name == "utilisation" else ""))
+        if field.name == "utilisation" else
+        ": stress needs sections with a shape; state.resultants() has the section forces"
+        if field.unit == "force / area" else ""))
 
 
 def find_fields(fields: Any, beams: Sequence[Any] = ()) -> list[Field]:
@@ -551,6 +562,8 @@ class DomainValues(Values):
         self._start, self._u, self._H = x, u, gradient
         self._find, self._eigen, self._known, self.n = None, (), {}, x.shape[1]
         self._small = np.iscomplexobj(u) and not gradient.real.any()
+
+    _shapeless = False
 
     @property
     def x(self) -> Array:

@@ -491,8 +491,8 @@ class Recovery:
         self.forces, self.beam, self._u = forces, forces.beam, u
         beam, layers = self.beam, self.beam.across.layers
         self.why = "" if beam.section.has_fields else (
-            f"{beam.section!r} has no shape: strain and stress are those of a rectangle with its "
-            "stiffnesses; State.resultants() has the section forces")
+            f"{beam.section!r} has no shape, and no stress: State.resultants() has the section "
+            "forces")
         if remembers(beam):
             self.why = "the stress of its material depends on the path of the strain"
         if forces.pressed:

@@ -315,8 +315,6 @@ class _Page:
             for group in (self.state.beams, *([domain] for domain in self.system.domains)):
                 every = []
                 for b in group:
-                    if isinstance(b, Beam) and not b.section.has_fields and kind == "stress":
-                        continue
                     with suppress(AncfError):  # a law without this stress, or without strength
                         every += self.state.extremes(field, 1, beam=b)
                 if every:
