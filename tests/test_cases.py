@@ -147,4 +147,5 @@ def test_an_envelope_is_printed_by_its_extremes():
     assert len(lines) == 6
     assert next(line for line in lines if line.startswith("greatest M 3 at s = 2 by '1.5 F'"))
     assert next(line for line in lines if line.startswith("greatest Q")).endswith(" by 'q'")
+    assert next(line for line in lines if line.startswith("least Q")).endswith("at s = 0 by 'q'")
     assert str(cases).splitlines()[-1] == "in kN, m"

@@ -47,7 +47,8 @@ class Envelope(NamedTuple):
             for k, (what, values, of) in enumerate((("least", self.least, np.argmin),
                                                     ("greatest", self.greatest, np.argmax))):
                 at = int(of(values[name]))
-                lines.append(f"{what} {name} {values[name][at]:.4g} at s = {self.s[at]:.4g} by "
+                s = self.s[at] if self.s[at] > 10.0 * BESIDE * self.s[-1] else 0.0
+                lines.append(f"{what} {name} {values[name][at]:.4g} at s = {s:.4g} by "
                              f"{str(self.by[name][k, at])!r}")
         return "\n".join(lines)
 

@@ -137,7 +137,7 @@ class Sketch:
         foot = np.max(self.points, axis=0) + [0.2 * self.size, 0.0]
         tip = foot + ARROW * self.size * np.array(s.direction[0]) * np.sign(s.value)
         self._arrow(foot, tip, kind=s.kind, color=MUTED)
-        self._text(f"{s.text}{abs(s.value):.6g}", tip, tip - foot, MUTED, s.kind)
+        self._text(s.text + rounded(abs(s.value), ""), tip, tip - foot, MUTED, s.kind)
 
     def _moment(self, s, at, largest, color=LOAD):
         angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
