@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from skfem import Basis, ElementQuad2, ElementVector, MeshQuad
 
-from skfem_ancf import (Beam, Circle, Domain, ElementBeamANCF, ElementBeamCable, FileError, Frame,
-                        InputError, MeshBeam, RigidBody, Scene, Section, StVenantKirchhoff)
+from skfem_ancf import (Beam, Circle, Domain, ElasticPlastic, ElementBeamANCF, ElementBeamCable,
+                        FileError, Frame, InputError, MeshBeam, RigidBody, Scene, Section,
+                        StVenantKirchhoff)
 from skfem_ancf.results.report import total_force
 
 STEEL = StVenantKirchhoff(2.1e11, 0.3, density=7850, strength=235e6)
@@ -131,6 +132,29 @@ def test_a_motion_is_reported_at_its_worst_instant(tmp_path):
     worst = int(np.argmax([state.extremes(count=1)[0].value for state in history]))
     assert any(f"the instant t = {history.t[worst]:g}," in text for text in page.text["p"])
     assert len(page.sources) == 6 and page.row("inertia and damping")
+
+
+def test_a_strip_that_sprang_back_bears_nothing(tmp_path):
+    """Its page says so of the reactions, and that section forces are errors of the elements."""
+    steel = ElasticPlastic(2e11, 0.3, 3e8, hardening=2e8)
+    mesh = MeshBeam.init_line(np.linspace(0, 0.1, 7), 0.002)
+    strip = Beam(mesh, ElementBeamCable(3), steel, 0.01)
+    bending = Scene(strip).clamp("left").fix("right", "r^2", displacement=lambda t: -0.03 * t)
+    bent = bending.run(1.0, increments=6).state(-1)
+    left = Scene(strip).clamp("left").run(2.0, increments=1, start=bent).state(-1)
+    text = Page(left.report(tmp_path / "left.html")).text["p"]
+    assert "No forces act on the structure." in text and not any("motion" in one for one in text)
+    assert any(one.endswith("has no load. The exact ones are zero.") for one in text)
+    text = Page(bent.report(tmp_path / "bent.html")).text["p"]
+    assert any(one.endswith("They are in balance.") for one in text)
+
+
+def test_obstacles_are_listed(tmp_path):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), ElementBeamCable(5), STEEL, 0.1)
+    scene = Scene(beam).clamp("left").obstacle(
+        Circle((0.9, 0.06), 0.05), friction=0.2, position=lambda t: (0, -0.02 * t))
+    row = Page(scene.solve_static().report(tmp_path / "pressed.html")).row("obstacle")
+    assert row[-2:] == ["Circle about (0.9, 0.06), radius 0.05, moves", "friction 0.2"]
 
 
 def test_wrong_files(tmp_path):

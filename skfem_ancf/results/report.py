@@ -31,6 +31,8 @@ LISTED = {"displacement": "length", "S_xx": "stress", "von_mises": "stress", "ut
 ROWS, INSTANTS = 40, 50
 #: Sum of all forces over the largest of them in an equilibrium.
 BALANCED = 1e-5
+#: Forces that are round-off, relative to the bending stiffness over the squared size.
+NO_FORCE = 1e-9
 #: Decimals of coordinates; section forces relative to the largest of their kind that are zero.
 ROUNDED, ZERO = 12, 1e-12
 #: Resolution of the pictures, in dots per inch.
@@ -209,7 +211,8 @@ class _Page:
         """All sections of the page."""
         state = self.state
         how = ("linear, for small displacements" if state.base is not None else
-               f"instant t = {state.t:g} of a motion" if state.t is not None else
+               f"instant t = {state.t:g}{' of a motion' * bool(np.any(state._inertia))}"
+               if state.t is not None else
                f"equilibrium for large displacements: {state.verdict}")
         units = "" if self.units is None else f" Units: {', '.join(self.units)}."
         start = state.replace(u=np.zeros_like(state.u), load=0.0, t=None)
@@ -222,6 +225,7 @@ class _Page:
             "<h2>Reactions</h2>", self._reactions(),
             "<h2>Results</h2>", self._extremes(), *self._pictures(), self._worst(),
             "<h2>Section forces</h2>" if state.beams else "", self._section_forces(),
+            *self._integrated(),
             "<h2>Findings</h2>", *([_text(text, "bad") for text in findings]
                                    or [_text("None: the solution is within the range of its mesh "
                                              "and materials.")]), *self._recovered(),
@@ -273,13 +277,17 @@ class _Page:
                 "force", "moment", "weight", "mass") else ""
             rows.append(("distributed force" if s.per else s.kind, place,
                          f"{s.text.removesuffix('= ')} {way}".strip(), value))
+        for one in self.system.forces.contacts.obstacles:
+            rows.append(("obstacle", "", repr(one.shape).strip("<>") + ", moves" * one.moves,
+                         (f"friction {one.friction:g}",) if one.friction else ""))
         rows.sort(key=lambda row: row[0] in ("support", "joint"))
         return _table(("what", "where", "", "value"), dict.fromkeys(rows))
 
     def _reactions(self):
         """Forces of supports, and the balance of all forces."""
         state, system, u = self.state, self.system, self.state._acted
-        rows = [(place, *self._forces(*force)) for place, force in supports_of(state)]
+        reactions = list(supports_of(state))
+        rows = [(place, *self._forces(*force)) for place, force in reactions]
         support = state._support_force()
         inertia, internal = state._inertia + np.zeros_like(u), state.internal_force
         joints = np.zeros_like(u) if not system.constraints.joints else (
@@ -288,7 +296,9 @@ class _Page:
                  "supports": np.where(system.constraints.free, 0.0, support) - joints,
                  "springs, obstacles, foundations": -internal, "inertia and damping": -inertia}
         totals = {name: total_force(system, u, force) for name, force in parts.items()}
-        size = max(np.max(np.abs(one[:2])) for one in totals.values()) or 1.0
+        every = [*totals.values(), *(force for _, force in reactions)]
+        largest = max(np.max(np.abs(one[:2])) for one in every)
+        size = largest or 1.0
         length = float(np.max(np.ptp(np.hstack([b.mesh.p for b in state.beams]), axis=1))
                        ) if state.beams else 1.0
         shown = [(name, *self._forces(*one)) for name, one in totals.items()
@@ -296,7 +306,9 @@ class _Page:
                      np.abs(one / [1, 1, length])) > 1e-9 * size]
         rest = sum(totals.values())
         error = max(np.max(np.abs(rest[:2])), abs(rest[2]) / length) / size
-        balance = _text(
+        least = NO_FORCE * min((float(np.min(b.across.bending)) for b in state.beams),
+                               default=0.0) / length**2
+        balance = _text("No forces act on the structure.", "note") if largest <= least else _text(
             f"The sum of all forces on the structure is {error:.1g} of the largest of them." + (
                 " They are in balance." if error < BALANCED else "" if state.t is None else
                 " The schemes of motions balance forces on average over a step."),
@@ -358,6 +370,15 @@ class _Page:
             *((1, 3) if beside else (3, 1)))
         return _figure(lambda: self.state.plot_resultants(axes=axes, on="structure")[0], "tall"
                        ) + _table(("", "value", "at", "beam"), rows)
+
+    def _integrated(self):
+        """Notes on section forces that are not those of equilibrium."""
+        for k, (name, why) in enumerate(self.state.recovered.items()):
+            if why and self.state._recovery_of(k, fields=False) is None:
+                yield _text(f"Section forces of beam {name} are integrals of the stress of its "
+                            f"elements, with its errors: {why}." + (
+                                " The exact ones are zero." if why.endswith("no load") else ""),
+                            "note")
 
     def _recovered(self):
         for name, why in self.state.recovered.items():
