@@ -4,11 +4,11 @@ import sys
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares, minimize
+from scipy.optimize import brentq, least_squares, minimize
 
 from skfem_ancf import (Beam, Circle, Design, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, Frame, InputError, MeshBeam, MissingExtra, NameUnknown,
-                        NeoHookean, RigidBody, Scene, StVenantKirchhoff, Temperature)
+                        ElementBeamCable, Frame, InputError, Line, MeshBeam, MissingExtra,
+                        NameUnknown, NeoHookean, RigidBody, Scene, StVenantKirchhoff, Temperature)
 
 S = np.linspace(0, 1, 5)
 
@@ -221,3 +221,64 @@ def test_what_has_no_derivative_is_said():
 
     with pytest.raises(InputError, match="number of degrees of freedom"):
         Design(finer, ["tip"])([1.0])
+
+
+@pytest.mark.parametrize("element, law", [
+    (ElementBeamCable(5), StVenantKirchhoff), (ElementBeamANCF(2), NeoHookean)])
+def test_no_gradient_at_a_critical_point(element, law):
+    """A column about to branch, and an arch about to snap; 1 % below they have one."""
+    def column(load):
+        beam = beam_of(height=0.02, element=element, law=law)
+        scene = Scene(beam).clamp("left").point_force((-load, 0), at=(1, 0))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    point = column(0.1).continuation(ds=0.03, max_load=1.1).critical_points[0]
+    loads = [("bifurcation", column, 0.1 * point.load, point)]
+
+    def arch(load):
+        rise = MeshBeam.init_curve(lambda s: np.array([s, 0.06 * np.sin(np.pi * s)]), S, 0.02)
+        scene = Scene(beam_of(element=element, law=law, mesh=rise)).clamp("left").clamp("right")
+        return scene.point_force((0, -load), at=(0.5, 0.06)).sensor("tip", "displacement",
+                                                                    at=(0.5, 0.06))
+
+    point = next(one for one in arch(5.0).continuation(
+        ds=0.03, until=lambda point: point.rate < 0).critical_points if one.kind == "limit")
+    loads.append(("limit", arch, 5.0 * point.load, point))
+    for kind, build, load, point in loads:
+        assert point.kind == kind
+        wrt = [(point.state.system.beams[0], "E")]
+        for gradient in (lambda: point.state.gradient("tip", wrt),
+                         lambda: point.state.gradient(lambda state: state.strain_energy, wrt),
+                         lambda: point.state.sensitivity(wrt)):
+            with pytest.raises(InputError, match="snaps or branches"):
+                gradient()
+        scene = build(0.99 * load)
+        by_load, = scene.solve_static().gradient("tip", [(scene.items[-1], "force")])
+        assert np.all(np.isfinite(by_load))
+
+
+def test_no_gradient_where_a_point_just_touches():
+    """The least gap is zero at a load that is found; 1 % beside it the gradient is that branch's.
+    """
+    def build(p):
+        scene = Scene(beam_of()).clamp("left").point_force((0, -p[0]), at=(1, 0))
+        scene.obstacle(Circle((0.5, -0.195), 0.15))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    def gap(load):
+        state = build([load]).solve_static()
+        (_, _, gap), = state.system.forces.contacts.look(np.array(state.u), 1.0)
+        return gap.min()
+
+    load, design = brentq(gap, 0.06, 0.1, xtol=1e-12), Design(build, ["tip"])
+    with pytest.raises(InputError, match=r"just touches an obstacle, at \(0\.50"):
+        design([load])
+    apart, touching = design([0.99 * load])[1], design([1.01 * load])[1]
+    assert np.isclose(apart[1, 0], difference(design, [0.99 * load])[1, 0], rtol=1e-6)
+    assert abs(touching[1, 0]) < 0.9 * abs(apart[1, 0])
+    # lying there, lightly pressed; lifted off but for the clamp
+    for weight in (-1.0, 1.0):
+        scene = Scene(beam_of()).clamp("left").obstacle(Line((0, -0.025))).gravity((0, weight))
+        scene.sensor("tip", "displacement", at=(1, 0))
+        by, = scene.solve_static().gradient("tip", [(scene.beams[0], "E")])
+        assert np.all(np.isfinite(by))

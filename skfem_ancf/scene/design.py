@@ -35,6 +35,12 @@ AGREE = 1e-3
 MANY_STEP, MANY, PAIR = 1e-4, 20, ((-1.0, -0.5), (1.0, 0.5))
 #: Step of displacements for readings that are functions, relative to the size of the scene.
 ASIDE = 1e-4
+#: Stiffness relative to that of the material at a critical point: an imperfect one is 0.01 at 1 %
+#: less load, and a limit point that is found to 1e-8 has 4e-5.
+SNAP = 1e-4
+#: Gap in heights, and force relative to the largest, of a point that just touches; motion relative
+#: to that of others below which a point is held.
+TOUCH, HELD = 1e-6, 1e-3
 
 
 class Design:
@@ -64,7 +70,8 @@ class Design:
     ------
     InputError
         If forces depend on the path, as friction or plasticity: then the state is at a kink, and a
-        derivative depends on the direction.
+        derivative depends on the direction. Also where a point just touches an obstacle, and at a
+        critical point, where derivatives have no bounds.
 
     References
     ----------
@@ -169,8 +176,11 @@ class Design:
         """Find the readings at p, unless it is the last one."""
         p = np.atleast_1d(require_finite("p", p)).astype(float)
         if self._p is None or not np.array_equal(self._p, p):
-            scene = self._scene(p)
-            self._begin(p, scene, self._solved(scene) if self._static else None)
+            scene, last, found = self._scene(p), self.state, None
+            if last is not None and last.system.N == scene.N:
+                with suppress(ConvergenceError, InputError):  # the start may be the cause
+                    found = scene.solve_static(start=scene.state(last.u))
+            self._begin(p, scene, found or scene.solve_static() if self._static else None)
 
     def _begin(self, p, scene, state):
         """Take the state at p."""
@@ -184,15 +194,6 @@ class Design:
         if not hasattr(scene, "solve_static"):
             raise InputError(f"build(p) must return a Scene, got {shown(scene)}")
         return scene
-
-    def _solved(self, scene):
-        last = self.state
-        if last is not None and last.system.N == scene.N:
-            try:
-                return scene.solve_static(start=scene.state(last.u))
-            except (ConvergenceError, InputError):  # the start may be the cause
-                pass
-        return scene.solve_static()
 
     def _sensors(self, scene):
         for one in self.readings:
@@ -257,9 +258,7 @@ class Design:
             else:
                 functions.append((one.what if isinstance(one, Sensor) else one, at, size))
             at += size
-        out = np.zeros((len(by_state), P.shape[1]))
-        if by_state.any():
-            out -= adjoint_of(state, by_state, P) @ P
+        out = -(adjoint_of(state, by_state, P) @ P)
         if functions:
             z = changes_of(tangent_of(state, P), P, state.system.N)
             for function, at, size in functions:
@@ -272,11 +271,9 @@ class Design:
         touching = state is not None and state.system.forces.contacts.obstacles
         step, stencil = (MANY_STEP, PAIR) if len(p) > MANY else (STEP, STENCIL)
         h = (TOUCHING if touching else step) * sizes
-        rows = [frozen.rows(self._built) for frozen in self._frozen]
-        noise = CHANGED * self._magnitudes(state, rows)
-        known = isinstance(self.build, Parameters)
+        noise = CHANGED * self._magnitudes(state, [one.rows(self._built) for one in self._frozen])
         by = Differences(lambda p: self._equations(p, state), p, h, stencil, noise)
-        if known:
+        if isinstance(self.build, Parameters):
             # the same degrees of freedom in the equations and in the rows of each eigenvalue
             n, c = len(self._values), self._built.system.constraints
             before, after = (0 if state is None else 1), (len(self._owners) - n) // (c.N + c.m)
@@ -429,7 +426,7 @@ class Gradient(Design):
         require_smooth(self.state)
         self._frozen, self._owners = [], np.zeros(0, int)
         P, N = self._changes(self._p, self.state), self.state.system.N
-        P = P[:N + self.state.system.constraints.m]
+        adjoint_of(self.state, np.zeros((0, P.shape[0])), P)  # or why there is none
         return self._shaped(changes_of(tangent_of(self.state, P), P, N)[:N])
 
 
@@ -440,16 +437,60 @@ def require_smooth(state: State) -> None:
                          "derivative of a reading depends on the direction, and is not defined")
 
 
+def require_regular(state: State, force: Array, soft: Array) -> None:
+    """Raise InputError at a critical point, or where a point just touches an obstacle.
+
+    ``soft`` (N,) is the displacement for any force (N,), at a critical point the mode. There loads
+    take away the stiffness by which elements resist.
+    """
+    system, u, resists = state.system.after(state.memory), np.array(state.u), 0.0
+    for beam in system.beams:
+        x, y, kernel = u[system.of(beam)], soft[system.of(beam)], beam.kernel
+        if kernel.linear:
+            resists += np.vdot(kernel.gather(y), kernel.viscous_forces(x, y, 1.0))
+        else:
+            B, HB, _ = kernel.gradients(x)
+            y = kernel.gather(y).reshape(len(B), -1, 1)
+            resists += np.vdot(B @ y, HB @ y)
+    if abs(soft @ force) < SNAP * resists:
+        raise InputError(f"this state snaps or branches: in one shape it has {soft @ force:.1g} of "
+                         f"the stiffness of its material, {resists:.1g}, so that derivatives have "
+                         "no bounds. Take another load, or CriticalLoad() as reading")
+    contacts = system.forces.contacts
+    for (_, group), (_, x, push, _, gap) in zip(contacts.groups, contacts.pushes(
+            u, None, state.load)):
+        largest = np.abs(system.internal_force(u, None, state.load)
+                         * system.constraints.coordinate_sizes).max() / system.size
+        i = group.first + 2 * np.arange(len(group.weights))[:, None]
+        # a point that supports hold can neither lift nor press
+        moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))
+        at = (np.abs(gap) < TOUCH * group.height) & (np.hypot(*push) <= TOUCH * largest) & (
+            moves > HELD * moves.max())
+        if at.any():
+            x, y = x[:, at.argmax()]
+            raise InputError(f"a point just touches an obstacle, at ({x:.6g}, {y:.6g}): the "
+                             "derivative depends on whether a change lifts or presses it. Take a "
+                             "load or a place at which it is in contact, or is not")
+
+
 def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
-    """The adjoint (r, N + m) of readings, for products with changes P (N + m, n)."""
+    """The adjoint (r, N + m) of readings, for products with changes P (N + m, n).
+
+    Raises InputError if it has no bounds, or depends on the direction.
+    """
     system = state.system.after(state.memory)
-    if system.symmetric and not P[system.constraints.fixed].count_nonzero():  # as in an iteration
+    c, N = system.constraints, system.N
+    force = c.free * np.cos(np.arange(N)**2) / c.coordinate_sizes
+    by, found = np.vstack([by_state, np.append(force, np.zeros(c.m))]), None
+    if system.symmetric and not P[c.fixed].count_nonzero():  # as in an iteration
         with suppress(*NO_FACTORS):
             system.assemble(np.array(state.u), state.load)
             system.solver.factorize(np.array(state.u), state.load, state.multipliers)
-            return np.array([np.concatenate(system.solver.solve(row[:system.N], row[system.N:]))
-                             for row in by_state])
-    return tangent_of(state, P[:, :0]).adjoint([1.0], by_state.T).T
+            found = np.array([np.concatenate(system.solver.solve(row[:N], row[N:])) for row in by])
+    if found is None:
+        found = tangent_of(state, P[:, :0]).adjoint([1.0], by.T).T
+    require_regular(state, force, found[-1, :N] * c.free)
+    return found[:-1]
 
 
 def tangent_of(state: State, P: Any) -> Bordered:

@@ -139,10 +139,8 @@ class Frequency(EigenReading):
         shape, factor = found.shapes[self.number].real, 0.5 / omega
         one = _Quadratic(system, state, shape, mu)
 
-        def rows(scene):
-            return factor * one.rows(scene.system)
-
-        return Frozen(rows, factor * second(state, one.vector) if self.loaded else None)
+        return Frozen(lambda scene: factor * one.rows(scene.system),
+                      factor * second(state, one.vector) if self.loaded else None)
 
 
 class BucklingLoad(EigenReading):
@@ -173,8 +171,9 @@ class BucklingLoad(EigenReading):
                              "potential, free of stress without them: use CriticalLoad()")
         self._require_simple(found.factors)
         free, shape = system.constraints.free, found.shapes[self.number]
-        x, (at, du, _, multipliers) = shape[free], _response(system)
-        geometric = x @ (_geometric(system, at, du, multipliers) @ x)
+        x, at = shape[free], _tangent(system, zero)
+        du, _, multipliers = at.response()
+        geometric = x @ (at.geometric(at.stresses(du), multipliers, 1.0) @ x)
         # the geometric stiffness is linear in the stress: strains of second order
         step = SMALL / np.abs(shape / system.constraints.coordinate_sizes).max()
         up, down = (_tangent(system, sign * step * shape) for sign in (1.0, -1.0))
@@ -183,7 +182,7 @@ class BucklingLoad(EigenReading):
         a, b = (part[:, 0] for part in Inverse(at).solve_both(
             (at.CB.T @ bent)[:, None], turned[system.N:, None]))
         y = _multipliers(at.J, at.multiply(x) + factor * (
-            _geometric(system, at, du, multipliers) @ x))
+            at.geometric(at.stresses(du), multipliers, 1.0) @ x))
         settled = system.constraints.values(1.0)
 
         def rows(scene):
@@ -194,7 +193,7 @@ class BucklingLoad(EigenReading):
             at = _tangent(system, np.zeros(system.N))
             own = system.external_force(np.zeros(system.N))[free] - (
                 at.B.T @ at.stresses(du) + at.S @ du[free] + at.J.T @ multipliers)
-            K = at.multiply(x) + factor * (_geometric(system, at, du, multipliers) @ x)
+            K = at.multiply(x) + factor * (at.geometric(at.stresses(du), multipliers, 1.0) @ x)
             out = np.zeros(system.N + len(y))
             out[:system.N][free] = x * K + factor * a * own
             out[system.N:] = 2.0 * y * (at.J @ x) - factor * b * (at.J @ du[free])
@@ -321,12 +320,3 @@ def _multipliers(J, forces):
 def _tangent(system, u):
     return StrainTangent(system, u, 0.0, None, np.zeros(system.constraints.m))
 
-
-def _response(system):
-    at = _tangent(system, np.zeros(system.N))
-    return at, *at.response()
-
-
-def _geometric(system, at, du, multipliers):
-    """The geometric stiffness of the linear stress of a displacement du (N,)."""
-    return at.geometric(at.stresses(du), multipliers, 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -129,9 +130,7 @@ class Parameters:
                       if isinstance(part[k], float)}
             return tuple(values), np.array(list(values.values())), ""
         path = self._path(owner, name)
-        value = owner
-        for part in path.split("."):
-            value = _part(value, part)
+        value = reduce(_part, path.split("."), owner)
         if path == "mesh.height" and owner.mesh.heights is not None:
             raise InputError(f"the height of {owner!r} varies: use the field (beam, 'height', "
                              "'nodes')")
@@ -170,9 +169,7 @@ class Parameters:
             path, old, found = "height", beam.mesh.height, basis(x)
         else:
             path = self._path(owner, name)
-            old = owner
-            for part in path.split("."):
-                old = _part(old, part)
+            old = reduce(_part, path.split("."), owner)
             if old is None:
                 raise InputError(f"{shown(owner)} has no argument {name!r} to which a function "
                                  "could be added")
@@ -244,9 +241,7 @@ class Parameters:
             return {"mesh": replace(mesh, heights=heights, height=float(heights.max()),
                                     taper=None)}
         if callable(one.field):
-            old = owner
-            for part in one.name.split("."):
-                old = _part(old, part)
+            old = reduce(_part, one.name.split("."), owner)
 
             def added(*x):
                 return (old(*x) if callable(old) else old) + np.tensordot(
