@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.linalg import lsqr, splu
 
-from ..actions.bound import derivative
+from ..actions.bound import BoundConstraint, BoundForce, derivative
+from ..actions.loads import Unscaled
+from ..actions.tables import mean_external_force
 from ..beam.kinematics import element_dofs, entries_of
 from ..core.errors import (InputError, NameUnknown, require_flag, require_integer,
                            require_positive)
 from ..core.types import Array
 from ..dynamics import GeneralizedAlpha, get_scheme
-from ..dynamics.base import Motion, Scheme
+from ..dynamics.base import Motion, Scheme, in_steps
 from ..dynamics.history import state_of
 from ..dynamics.run import integrator_of
 from ..dynamics.sensors import locate, read
@@ -35,8 +37,12 @@ STEP = 1e-4
 INSTANT = 1e-2
 #: Step of displacements for derivatives of damping forces, relative to the scene.
 SMALL = 1e-3
+#: The same for mean forces that are no polynomials: it must be small compared with a time step.
+TINY = 1e-5
 #: Relative change of an equation that is no round-off.
 CHANGED = 1e-9
+#: Part of a force along a direction that its pattern may miss.
+MISSED = 1e-6
 #: The arrays of a motion on which the next step depends.
 NAMES = ("u", "v", "acceleration", "algorithmic")
 
@@ -60,7 +66,8 @@ class MotionDesign(Design):
     t_end, dt
         Time at the end, and the size of the steps.
     scheme
-        "generalized-alpha", "hht", "newmark", or such a :class:`~skfem_ancf.Scheme`.
+        "generalized-alpha", "hht", "newmark", "energy-momentum", or such a
+        :class:`~skfem_ancf.Scheme`.
     static
         Start from the static solution, which depends on the parameters, too; by default from the
         reference configuration.
@@ -80,7 +87,7 @@ class MotionDesign(Design):
     ------
     InputError
         For other schemes; with contact, materials with a history, and prescribed motions that
-        depend on the parameters.
+        depend on the parameters; for "energy-momentum" also with sliders.
 
     References
     ----------
@@ -114,9 +121,11 @@ class MotionDesign(Design):
         self.every = require_integer("every", every, 1)
         self.t_end, self.dt = require_positive("t_end", t_end), require_positive("dt", dt)
         self.scheme, self.static = get_scheme(scheme), require_flag("static", static)
-        if not isinstance(self.scheme, GeneralizedAlpha):
-            raise InputError(f"derivatives of a motion need the scheme 'generalized-alpha', 'hht' "
-                             f"or 'newmark', got {self.scheme!r}")
+        if not (isinstance(self.scheme, GeneralizedAlpha)
+                or self.scheme.conserving and in_steps(self.scheme)):
+            raise InputError("derivatives of a motion need one equation for each step: the scheme "
+                             "'generalized-alpha', 'hht', 'newmark' or 'energy-momentum', without "
+                             f"stages or parts of a step; got {self.scheme!r}")
         self.history: Any = None
         self._static = self.static
 
@@ -127,10 +136,15 @@ class MotionDesign(Design):
                 system.forces.changing):
             raise InputError("derivatives of a motion are of smooth forces without a history: this "
                              "scene has contact, friction or a material with a history")
+        own = [joint for joint in system.constraints.joints if self.scheme.conserving and (
+            type(joint).mean_entries is not BoundConstraint.mean_entries)]
+        if own:
+            raise InputError(f"{own[0]!r} has a Jacobian of its own in steps that conserve energy, "
+                             "without derivatives: use the scheme 'generalized-alpha'")
         for name in self.readings:
             if not isinstance(name, str) or name not in scene.sensors:
                 raise NameUnknown("sensor", name, scene.sensors)
-        self._p, self._built, self.state, self._J = p, scene, state, None
+        self._p, self._built, self.state, self._J, self._coloured = p, scene, state, None, {}
         n = max(1, round(self.t_end / self.dt))
         kept = None if self.every == 1 else self.dt * np.append(np.arange(0, n, self.every), n)
         self.history = scene.integrate(self.t_end, self.dt, self.scheme, state, t_eval=kept)
@@ -175,6 +189,10 @@ class MotionDesign(Design):
         state = state_of(scene.system, self.scheme, y)
         return np.concatenate([np.ravel(read(one, at, state)) for one, at in located])
 
+    def _linear_step(self, y, before):
+        mean = self.scheme.conserving and before is not None
+        return (_MeanStep if mean else _Step)(self, y, before)
+
     # forward
 
     def _jacobian(self, p, scene, state):
@@ -189,7 +207,7 @@ class MotionDesign(Design):
 
         rows, old = [], None
         for before, y in self._steps():
-            step = _Step(self, y, before)
+            step = self._linear_step(y, before)
             old = step.forward(by(step.equations), old)
             rows.append(np.array([sum(c * self._read_in(*other, replace(y, **{
                 name: getattr(y, name) + s * x[:, i] for name, x in old.items()}))
@@ -221,6 +239,7 @@ class MotionDesign(Design):
         if isinstance(self.build, Parameters):
             groups = self.build.groups(c.N + c.m)
         out, bars = np.zeros(len(p)), {name: np.zeros(c.N) for name in NAMES}
+        bars["force"] = np.zeros(c.m)
         others: dict[bytes, Any] = {}
 
         def equations(step, w, q):
@@ -231,7 +250,7 @@ class MotionDesign(Design):
             return np.append(step.equations(scene), seen)
 
         for (before, y), w in zip(self._steps(back=True), weights[::-1]):
-            step, pull, read_here = _Step(self, y, before), np.zeros(c.m), int(w.any())
+            step, pull, read_here = self._linear_step(y, before), np.zeros(c.m), int(w.any())
             if read_here:
                 rows = [rows_of(self._built.system, state_of(self._built.system, self.scheme, y),
                                 self._built.sensors[name]) for name in self.readings]
@@ -241,7 +260,8 @@ class MotionDesign(Design):
             adjoint, bars = step.backward(bars, pull)
             size = np.append(step.magnitudes(), [np.abs(w).max()] * read_here)
             found = Differences(partial(equations, step, w), p, h, STENCIL, CHANGED * size).of(
-                [(members, np.append(np.tile(of, 3), [-1] * read_here)) for members, of in groups])
+                [(members, np.append(np.tile(of, len(adjoint) // len(of)), [-1] * read_here))
+                 for members, of in groups])
             step.require_held(found[c.fixed].toarray())
             out += np.append(-adjoint, [1.0] * read_here) @ found
         return out
@@ -283,12 +303,16 @@ class _Step:
                                       if c.m else np.zeros(0) for x in sides)
         self._solver = self._linearised(h * gamma * b, self._kick * b)
 
-    def equations(self, scene: Any) -> Array:
-        """The equations of a scene with other parameters at this step, (3 (N + m),)."""
-        system, y, c = scene.system, self.y, scene.system.constraints
-        if c.N != len(y.u) or c.m != len(y.multipliers):
+    def _same(self, system):
+        """A system with other parameters, and its constraints."""
+        if (system.N, system.constraints.m) != (len(self.y.u), len(self.y.multipliers)):
             raise InputError("the parameters change the number of degrees of freedom or of joint "
                              "equations")
+        return system, system.constraints
+
+    def equations(self, scene: Any) -> Array:
+        """The equations of a scene with other parameters at this step, (3 (N + m),)."""
+        (system, c), y = self._same(scene.system), self.y
         J, M, static = c.sparse_jacobian(y.u, y.t), system.mass.multiply, self._design.state
         instant = INSTANT * self._h
         rate, bend = (f(instant, system, y.u, y.v, x, y.t)
@@ -328,7 +352,7 @@ class _Step:
         if self._raw is not None:
             held = replace(y, v=self._raw[0], multipliers=y.multipliers - self._force)
         M, D, K, _, J = matrices_of(system, state_of(system, design.scheme, held))
-        K, self._damping = K + _turning(system, held), D
+        K, self._damping = K + _turning(design, held), D
         turned = [c.curvature(y.u, y.t, x) for x in (self._impulse, self._force)]
         s = INSTANT * h
         early, late = (c.sparse_jacobian(y.u + x * y.v + 0.5 * x * x * y.acceleration, y.t + x)
@@ -351,16 +375,7 @@ class _Step:
                     rows[2], [bend, None, 2.0 * slope, None, J, None]]
         else:
             rows = [row[::2] for row in rows]
-        sizes, one = c.coordinate_sizes, np.ones(c.m)
-        scale = float(np.abs((K + M / h**2).diagonal() * sizes**2)[c.free].max())
-        left = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes,
-                               scale * h * h * one])
-        right = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes / h**2,
-                                scale * one])
-        keep = np.tile(np.append(c.free, np.ones(c.m, bool)), 3)
-        A = sparse.diags_array(left) @ sparse.block_array(rows, format="csr") @ (
-            sparse.diags_array(right))
-        return _Factors(splu(sparse.csc_array(A[keep][:, keep])), left, right, keep)
+        return _factors(rows, K + M / h**2, c, h)
 
     def forward(self, change: Array, old: Any) -> dict[str, Array]:
         """Derivatives (..., n) by name, from those of the equations and of the instant before."""
@@ -378,7 +393,7 @@ class _Step:
             right[2 * n:2 * n + c.N] += a
         x = self._solver.solve(right).reshape(3, n, -1)
         found = dict(zip(NAMES, (x[0, :c.N], x[1, :c.N], x[2, :c.N], x[2, :c.N])))
-        found["multipliers"] = x[2, c.N:]
+        found["multipliers"] = found["force"] = x[2, c.N:]
         if old is not None:
             found["multipliers"] = x[2, c.N:] + x[0, c.N:]
             found["algorithmic"] = x[2, :c.N] / self._kick + sum(
@@ -394,12 +409,111 @@ class _Step:
         start = self._before is None
         u, v, a, w = (bars[name] for name in NAMES)
         right = np.concatenate([u, 0.0 * pull if start else pull, v, 0.0 * pull,
-                                a + (w if start else w / self._kick), pull])
+                                a + (w if start else w / self._kick), pull + bars["force"]])
         found = self._solver.solve(right, "T")
         one, two, three = (x[:c.N] for x in found.reshape(3, -1))
         kinds = (self._a, c.free * M(three - one)), (self._v, c.free * (
             M(two) - self._damping.T @ one)), (self._w, w)
-        return found, {name: sum(row[k] * x for row, x in kinds) for k, name in enumerate(NAMES)}
+        return found, {name: sum(row[k] * x for row, x in kinds) for k, name in enumerate(
+            NAMES)} | {"force": 0.0 * pull}
+
+
+class _MeanStep(_Step):
+    """A step of :class:`~skfem_ancf.EnergyMomentum`, with mean forces; as _Step, but for u, l; v,
+    impulses.
+
+    Accelerations and multipliers at the end are extrapolated from those in the middle of this step
+    and the one before, w and "force".
+    """
+
+    def __init__(self, design: MotionDesign, y: Motion, before: Motion) -> None:
+        system = self._system = design._built.system
+        c, h, self.y, self._begin, self._design = (
+            system.constraints, y.t - before.t, y, before, design)
+        self._h, self._ahead = h, h / (h + before.before)
+        self._middle, self._t = 0.5 * (before.u + y.u), 0.5 * (before.t + y.t)
+        self._speed, self._turn = (y.u - before.u) / h, 0.25 * (before.v + y.v)
+        self._velocity = np.where(c.free, 2.0 * self._speed - before.v, y.v)  # before joints act
+        self._J = J = c.sparse_jacobian(self._middle, self._t)
+        self._impulse = lsqr(J[:, c.free].T, system.mass.multiply(self._velocity - y.v)[c.free],
+                             atol=0.0, btol=0.0)[0] if c.m else np.zeros(0)
+        self._force = y.force - self._impulse / h
+        self._solver = self._linearised()
+
+    def equations(self, scene: Any) -> Array:
+        """The equations of a scene with other parameters at this step, (2 (N + m),)."""
+        (system, c), y, start, M = (self._same(scene.system), self.y, self._begin,
+                                    scene.system.mass.multiply)
+        J = c.sparse_jacobian(self._middle, self._t)
+        first = (M((self._velocity - start.v) / self._h) + _mean(system, self._t, start.u, y.u)
+                 + J.T @ self._force - c.mean_turning(start.u, y.u, start.v, y.v, self._t,
+                                                      self._impulse))
+        if system.damped:
+            first = first + system.damping_force(self._middle, self._speed, self._t)
+        first[c.fixed] = c.values(y.t)
+        return np.concatenate([
+            first, c.constraint(y.u, y.t), M(y.v - self._velocity) + J.T @ self._impulse,
+            _rate(INSTANT * self._h, system, y.u, y.v, y.v, y.t)])
+
+    def magnitudes(self) -> Array:
+        found = super().magnitudes()
+        return found[:2 * len(found) // 3]
+
+    def _linearised(self):
+        system, y, start, h, c, t = (self._system, self.y, self._begin, self._h,
+                                     self._system.constraints, self._t)
+        M, u, force = sparse.csr_array(system.mass.tocsc()), self._middle, partial(_mean, system, t)
+        late = _by_columns(self._design, lambda x: force(start.u, x), y.u, t, True)
+        early = _by_columns(self._design, lambda x: force(x, y.u), start.u, t, True)
+        if system.damped:
+            held = replace(y, t=t, u=u, v=self._speed)
+            D = matrices_of(system, state_of(system, self._design.scheme, held)).D / h
+            turning = 0.5 * _turning(self._design, held)
+            late, early = late + turning + D, early + turning - D
+        s, kick = INSTANT * h, c.curvature(u, t, self._impulse)
+        # derivatives along the mean velocity: of J, and of the curvature if Phi is not quadratic
+        by_impulse, third = (
+            (f(u + s * self._turn) - f(u - s * self._turn)) / (2.0 * s)
+            for f in (lambda x: c.sparse_jacobian(x, t),
+                      lambda x: c.curvature(x, t, self._impulse)))
+        turned = 0.5 * (c.curvature(u, t, self._force) + third)
+        A = late + turned + 2.0 / h**2 * M
+        self._by = sparse.block_array([
+            [early + turned - 2.0 / h**2 * M, 0.25 * kick - 2.0 / h * M],
+            [0.5 * kick + 2.0 / h * M, M]], format="csr")
+        rows = [[A, self._J.T, 0.25 * kick, by_impulse.T],
+                [0.5 * kick - 2.0 / h * M, None, M, self._J.T]]
+        if c.m:
+            J = c.sparse_jacobian(y.u, y.t)
+            slope = (c.sparse_jacobian(y.u + s * y.v, y.t + s)
+                     - c.sparse_jacobian(y.u - s * y.v, y.t - s)) / (2.0 * s)
+            zero = sparse.csr_array((c.m, c.m))
+            rows = [rows[0], [J, zero, None, None], rows[1], [slope, None, J, None]]
+        else:
+            rows = [row[::2] for row in rows]
+        return _factors(rows, A, c, h)
+
+    def forward(self, change: Array, old: Any) -> dict[str, Array]:
+        c, h, ahead = self._system.constraints, self._h, self._ahead
+        n = c.N + c.m
+        self.require_held(change[:c.N][c.fixed])
+        right = -change.reshape(2, n, -1)
+        right[:, :c.N] -= (self._by @ np.concatenate([old["u"], old["v"]])).reshape(2, c.N, -1)
+        x = self._solver.solve(right.reshape(2 * n, -1)).reshape(2, n, -1)
+        w, force = (x[1, :c.N] - old["v"]) / h, x[0, c.N:] + x[1, c.N:] / h
+        return {"u": x[0, :c.N], "v": x[1, :c.N], "algorithmic": w, "force": force,
+                "acceleration": w + ahead * (w - old["algorithmic"]),
+                "multipliers": force + ahead * (force - old["force"])}
+
+    def backward(self, bars: dict[str, Array], pull: Array) -> tuple[Array, dict[str, Array]]:
+        N, h, ahead = self._system.N, self._h, self._ahead
+        w = (bars["algorithmic"] + (1.0 + ahead) * bars["acceleration"]) / h
+        force = bars["force"] + (1.0 + ahead) * pull
+        found = self._solver.solve(np.concatenate([bars["u"], force, bars["v"] + w, force / h]),
+                                   "T")
+        u, v = -(self._by.T @ found.reshape(2, -1)[:, :N].ravel()).reshape(2, N)
+        return found, {"u": u, "v": v - w, "acceleration": 0.0 * w,
+                       "algorithmic": -ahead * bars["acceleration"], "force": -ahead * pull}
 
 
 class _Factors(NamedTuple):
@@ -419,18 +533,78 @@ class _Factors(NamedTuple):
         return out
 
 
-def _turning(system, y):
-    """The derivative of the damping force by the displacement, sparse (N, N).
+def _factors(rows, K, c, h):
+    """The factors of equations and unknowns in blocks u, l; v, impulses; a, forces, or the first.
+
+    They are scaled by the sizes of coordinates, a stiffness K and the time h.
+    """
+    sizes, one = c.coordinate_sizes, np.ones(c.m)
+    scale = float(np.abs(K.diagonal() * sizes**2)[c.free].max())
+    n = 2 * len(rows) // (2 if c.m else 1)
+    left = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes,
+                           scale * h * h * one][:n])
+    right = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes / h**2,
+                            scale * one][:n])
+    keep = np.tile(np.append(c.free, np.ones(c.m, bool)), n // 2)
+    A = sparse.diags_array(left) @ sparse.block_array(rows, format="csr") @ (
+        sparse.diags_array(right))
+    return _Factors(splu(sparse.csc_array(A[keep][:, keep])), left, right, keep)
+
+
+def _turning(design, y):
+    """The derivative of the damping force by the displacement, sparse (N, N)."""
+    system = design._built.system
+    if not (system.viscous or system.forces.resists) or not y.v.any():
+        return sparse.csr_array((system.N, system.N))
+    return _by_columns(design, lambda u: system.damping_force(u, y.v, y.t), y.u, y.t, False)
+
+
+def _by_columns(design, force, u, t, mean):
+    """The derivative of a force, a mean one or of damping, by the displacement at u, sparse (N, N).
 
     By differences; columns without common rows are moved at once, see [2] of Design.
     """
+    system = design._built.system
+    if mean not in design._coloured:
+        design._coloured[mean] = _colours(system, u, t, mean)
+    (i, j, colours, step), sizes = design._coloured[mean], system.constraints.coordinate_sizes
+    values = np.zeros(len(i))
+
+    def along(d):
+        return sum(c * force(u + x * step * sizes * d) for x, c in STENCIL) / step
+
+    for colour in range(colours.max() + 1):
+        change, own = along(colours == colour), colours[j] == colour
+        values[own] = change[i[own]] / sizes[j[own]]
+    found, d = sparse.csr_array((values, (i, j)), shape=2 * (system.N,)), np.cos(np.arange(len(u)))
+    missed = np.abs(found @ (sizes * d) - along(d)) * sizes
+    if missed.max() > MISSED * np.max(sizes * (abs(found) @ sizes)):
+        raise InputError("a force couples degrees of freedom that share no element: derivatives of "
+                         "its motions are not available")
+    return found
+
+
+def _colours(system, u, t, mean):
+    """Rows and columns (k,) of the derivative of a force, colours (N,) of columns, and a step.
+
+    Mean forces of loads with an energy of their own couple all DOFs of a beam, those of torques
+    both ends; they are no polynomials, nor are those of nonlinear laws.
+    """
+    n, elements, own, pairs = len(system.beams), system.forces.elements, [], []
     pattern = [entries_of(s.start + element_dofs(beam)) for beam, s in zip(
-        system.beams, system.slices) if system.viscous]
-    if system.forces.resists:
-        pattern.append(system.forces.entries(system.backend.tables.plain.forces, y.t, y.u, y.v,
-                                             1.0)[:2])
-    if not pattern or not y.v.any():
-        return sparse.csr_array((system.N, system.N))
+        system.beams, system.slices) if mean or system.viscous]
+    if elements:
+        pattern.append(system.forces.entries(system.backend.tables.plain.forces, t, u, u, 1.0)[:2])
+    if mean:
+        own = [load for load in system.loads if not (
+            load.constant or load.turning or load.linear or load.eigen_stresses)]
+        own += [e.load for e in elements if isinstance(e, Unscaled)]
+        pairs = [system.of(load).start + np.ravel(load.dofs) for load in system.loads
+                 if load.turning and load.couple is not None]
+        blocks = [system.of(load) for load in own] + system.slices[
+            n:len(system.members) - len(system.domains)]
+        pattern += [entries_of(np.arange(system.N)[s][None]) for s in blocks]
+        pattern += [entries_of(np.concatenate(pairs)[None])] if pairs else []
     i, j = (np.concatenate([np.ravel(part) for part in parts]) for parts in zip(*pattern))
     touched = sparse.csr_array((np.ones(len(i)), (i, j)), shape=(system.N, system.N))
     touched.sum_duplicates()
@@ -439,13 +613,16 @@ def _turning(system, y):
     for k in np.unique(j):
         used = colours[near.indices[near.indptr[k]:near.indptr[k + 1]]]
         colours[k] = np.setdiff1d(np.arange(len(used) + 1), used)[0]
-    values, steps = np.zeros(len(i)), SMALL * system.constraints.coordinate_sizes
-    for colour in range(colours.max() + 1):
-        change = sum(c * system.damping_force(y.u + x * steps * (colours == colour), y.v, y.t)
-                     for x, c in STENCIL)
-        own = colours[j] == colour
-        values[own] = change[i[own]] / steps[j[own]]
-    return sparse.csr_array((values, (i, j)), shape=touched.shape)
+    smooth = not own and all(beam.kernel.linear for beam in system.beams) and not any(
+        getattr(type(e), "mean_force", None) is BoundForce.mean_force for e in elements)
+    return i, j, colours, SMALL if smooth or not mean else TINY
+
+
+def _mean(system, t, u0, u1):
+    """The mean of internal forces less loads over a step about t, (N,)."""
+    tables, loads = system.backend.tables, np.zeros(system.N)
+    mean_external_force(tables.plain.loads, tables.factors(np.array([t]))[0], t, u0, u1, loads)
+    return system.mean_internal_force(u0, u1, t) - loads
 
 
 def _residual(t, system, u, a, l, v):
