@@ -137,6 +137,8 @@ class ForceElement(BoundForce, Item):
         bound = self._thawed()
         if is_builtin(self) and bound.parts.__func__ is not BoundForce.parts:
             bound.links = list(bound.bind(layout))
+            if bound.parts() is None and bound.entries is None:  # a user's law, as k(elongation)
+                try_force(bound)
             bound._freeze()
             return [bound]
         hint = ("a force element defines bind(scene), which returns a list of points, and force(x, "
