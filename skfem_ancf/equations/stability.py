@@ -22,8 +22,8 @@ STABILISING = 1e-6
 DENSE = 64
 #: Largest relative difference of nodal displacements in a rigid translation.
 SAME = 0.2
-#: Relative size of forces that are zero.
-NOTHING = 1e-20
+#: Forces that are zero, over modulus times area: strains at rest are of this size in compiled code.
+NOTHING = 1e-17
 #: Largest relative asymmetry that is round-off.
 ROUND_OFF = 1e-10
 

@@ -11,7 +11,7 @@ from ..core.errors import ConvergenceError
 from ..core.band import NO_FACTORS
 from ..core.types import Array
 from ..equations import stability
-from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, NEVER, rules_of
+from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, rules_of
 from ..equations.evaluation import Target
 from ..equations.system import System
 from . import descent
@@ -112,11 +112,12 @@ class Increment:
         As of a body in a turned scene that just touches an obstacle.
         """
         system, (u, multipliers) = self.system, (self.start.u, self.start.multipliers)
-        target, *_ = self._target(system.backend.tables, u, multipliers, system.solver)
+        tables = system.backend.tables
+        target, *_ = self._target(tables, u, multipliers, system.solver)
         force = system.internal_force(u, self.time, self.load)
         missing = self.load * system.external_force(u) - force
-        gaps = system.constraints.constraint(u, self.load)
-        still = not (target.moving or np.any(gaps))
+        gaps = np.abs(system.constraints.constraint(u, self.load)) / tables.plain.joints.sizes
+        still = not target.moving and np.max(gaps, initial=0.0) <= CLOSED
         rests = still and stability.is_nothing(system, missing)
         return Equilibrium(u, multipliers, force) if rests else None
 
