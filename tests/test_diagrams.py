@@ -126,3 +126,23 @@ def test_an_obstacle_that_is_not_touched_leaves_the_recovered_fields():
     assert state.recovered == {0: ""}
     assert_allclose(state.stress((0.3, 0.01)), free.solve_static().stress((0.3, 0.01)), rtol=1e-6,
                     atol=1.0)
+
+
+def test_labels_of_a_frame_do_not_overlap():
+    """Three bays of three storeys: neither each other, nor at the ends of columns the girders."""
+    number = np.arange(16).reshape(4, 4)
+    columns = np.column_stack([number[:-1].ravel(), number[1:].ravel()])
+    girders = np.column_stack([number[1:, :-1].ravel(), number[1:, 1:].ravel()])
+    frame = Frame.from_lines([(4.0 * x, 3.0 * y) for y in range(4) for x in range(4)],
+                             np.vstack([columns, girders]), height=0.3, width=0.1,
+                             groups={"columns": range(12), "girders": range(12, 21)},
+                             material=StVenantKirchhoff(2.1e11, 0.3)).units("N", "m")
+    frame.clamp(list(range(4))).line_load((0, -2e4), beam="girders").point_force((2e4, 0), at=12)
+    normal, shear, _ = frame.solve_static().plot_resultants()
+    normal.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in shear.texts]
+    assert len(boxes) > 8
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    storeys = normal.transData.transform([(0.0, 3.0 * y) for y in range(1, 4)])[:, 1]
+    boxes = [text.get_window_extent() for text in normal.texts]
+    assert not any(box.y0 < y < box.y1 for box in boxes for y in storeys)

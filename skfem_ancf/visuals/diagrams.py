@@ -24,8 +24,9 @@ SIGNS = "#2f6fa8", "#c1442e"
 ORDINATE, OF_MEMBERS, ROOM, ROUND_OFF, LABELLED = 0.14, 0.35, 0.22, 1e-8, 0.03
 #: Sections of all members together, and in each element at least and at most.
 SECTIONS, FEW, MANY = 4000, 9, 65
-#: Largest number of labels in a diagram, and their least distance relative to the structure.
-LABELS, APART = 14, 0.09
+#: Largest number of labels in a diagram; their least distance, width and height, relative to the
+#: structure.
+LABELS, APART, WIDE, HIGH = 14, 0.09, 0.2, 0.05
 #: The convention of signs, written below.
 NOTE = ("N > 0: tension. Q > 0: what follows pushes to the left. Both to the left of a member if "
         "positive.\nM on the side that it stretches, M > 0 on the right (below). Members run from "
@@ -197,7 +198,10 @@ def _fill(ax, line, values, scale):
 
 
 def _label(ax, lines, name, scale, least, size, unit):
-    """Write extremes of each line, the largest first, where there is room."""
+    """Write extremes of each line, the largest first, where there is room.
+
+    One at an end of a member is moved along it, away from what meets there.
+    """
     from matplotlib.patheffects import withStroke
 
     places = []
@@ -210,14 +214,21 @@ def _label(ax, lines, name, scale, least, size, unit):
             if abs(values[k]) > least:
                 side = np.sign(scale * values[k]) * line["normal"][:, k]
                 tip = line["x"][:, k] + scale * values[k] * line["normal"][:, k]
-                places.append((abs(values[k]), values[k], tip, side))
-    taken: list[Array] = []
-    for _, value, tip, (a, b) in sorted(places, key=lambda one: -one[0]):
-        if len(taken) < LABELS and all(np.hypot(*(tip - other)) > APART * size for other in taken):
-            taken.append(tip)
+                inward = line["x"][:, len(values) // 2] - line["x"][:, k]
+                inward *= (k in (0, len(values) - 1)) / (np.hypot(*inward) or 1.0)
+                places.append((abs(values[k]), values[k], tip, side, inward))
+    taken: list[tuple[Array, Array]] = []
+    for _, value, tip, side, inward in sorted(places, key=lambda one: -one[0]):
+        way = [a if abs(a) > 0.4 else c if abs(c) > 0.4 else 0.0 for a, c in zip(side, inward)]
+        middle = tip + 0.5 * size * np.sign(way) * [WIDE, HIGH]
+        if len(taken) < LABELS and all(
+                np.hypot(*(tip - other)) > APART * size and
+                np.any(np.abs(middle - center) > np.multiply([WIDE, HIGH], size))
+                for other, center in taken):
+            taken.append((tip, middle))
             ax.annotate(
-                rounded(value, unit), tip, (4 * a, 4 * b), textcoords="offset points",
+                rounded(value, unit), tip, 4 * side + 3 * inward, textcoords="offset points",
                 fontsize=8, color=SIGNS[0] if value > 0 else SIGNS[1], gid=name, zorder=7,
                 path_effects=[withStroke(linewidth=2, foreground="white")],
-                ha="left" if a > 0.4 else "right" if a < -0.4 else "center",
-                va="bottom" if b > 0.4 else "top" if b < -0.4 else "center")
+                ha=("center", "left", "right")[int(np.sign(way[0]))],
+                va=("center", "bottom", "top")[int(np.sign(way[1]))])

@@ -108,7 +108,7 @@ class Obstacle(ForceElement):
         self.damping = require_not_negative("damping", damping)
         self.penalty = None if stiffness is None else require_positive("stiffness", stiffness)
         self.method = require_option("method", method, METHODS)
-        self.points = None if points is None else require_integer("points", points, 2, 64)
+        self.points = None if points is None else require_integer("points", points, 2, MOST)
         self.position, self.angle = position, angle
         for name, function in (("position", position), ("angle", angle)):
             if function is not None:
