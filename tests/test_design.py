@@ -5,6 +5,8 @@ import sys
 import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares, minimize
+from skfem import Functional
+from skfem.helpers import dot
 
 from skfem_ancf import (Beam, Circle, Design, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, Frame, InputError, Line, MeshBeam, MissingExtra,
@@ -64,6 +66,26 @@ def test_functions_of_the_state():
 
     agree(Design(build, [lambda state: state.strain_energy,
                          lambda state: state.reactions("left").moment]), [0.05, 2e6, 1.0])
+
+
+def test_norms_of_stress_and_functionals_of_scikit_fem():
+    """A p-norm of the equivalent stress, and an integral over the body of displacements."""
+    points = np.array([np.linspace(0.05, 0.95, 7), 0.02 + 0 * np.linspace(0.05, 0.95, 7)])
+
+    def norm(state):
+        return np.sum(np.abs(state.field("von_mises", points))**8)**0.125
+
+    def swept(state):
+        beam = state.beams[0]
+        return Functional(lambda w: dot(w["u"], w["u"])).assemble(beam.basis, u=state.u_of(beam))
+
+    def build(p):
+        return Scene(beam_of(p[0], height=p[1])).clamp("left").point_force((0, -p[2]), at=(1, 0))
+
+    agree(Design(build, [norm, swept]), [2e6, 0.05, 0.3])
+    scene = build([2e6, 0.05, 0.3])
+    found = scene.solve_static().gradient(norm, [(scene.beams[0], "height", "nodes")])[0]
+    assert found.shape == (5,) and found[0] < found[2] < 0.0  # the root decides
 
 
 def test_heights_at_nodes_are_changed_together():

@@ -196,6 +196,18 @@ def test_random_load_on_a_mass():
         found.rms(np.ones(3))
 
 
+def test_rms_of_stress_under_a_slow_random_force():
+    """White noise far below the first frequency: the static stress times the root of the power."""
+    F, h, b, density, slow = 1.0, 0.05, 0.1, 0.3, 0.01
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), h), ElementBeamCable(5),
+                StVenantKirchhoff(1e8, 0.0, 1000.0), b)
+    scene = Scene(beam).clamp("left").sensor("S", "S_xx", at=(0.25, h / 2))
+    omega = np.linspace(0.0, slow * scene.modes(1).frequencies[0], 21)
+    found = scene.frequency_response(omega, [PointForce((0, F), at=(1, 0))], ["S"]).rms(density)
+    static = F * 0.75 * (h / 2) / (b * h**3 / 12)
+    assert np.allclose(found, static * np.sqrt(density * omega[-1]), rtol=1e-3)
+
+
 def test_body_in_a_rotating_frame():
     """Two frequencies, sqrt(k / m) - Omega and sqrt(k / m) + Omega."""
     body = RigidBody(mass=2.0, inertia=1.0, position=(0, 0))
