@@ -127,6 +127,17 @@ def test_many_heights_by_one_adjoint_solution(scheme):
     assert np.isclose(gradient @ step, change, rtol=1e-6)
 
 
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_last_value_alone_by_fields(scheme):
+    """Instants that the objective does not read, and a start that no height changes."""
+    scene = Scene(beam_of(mesh=MeshBeam.init_line([0, 0.5, 1], 0.05))).clamp("left")
+    scene.gravity((0, -9.81)).sensor("tip", "displacement", at=(1, 0))
+    heights = Parameters(scene, [(scene.beams[0], "height", "nodes")])
+    design = MotionDesign(heights, ["tip"], 0.04, 0.01, scheme)
+    _, gradient = design.objective(lambda y: y[-1])(heights.start)
+    assert np.allclose(gradient, design.jacobian(heights.start)[-1], rtol=1e-6)
+
+
 def test_mean_forces_of_a_law_a_torque_and_an_energy():
     """Means that are no polynomials, and couple a whole beam or the sections of a motor."""
     def build(p):

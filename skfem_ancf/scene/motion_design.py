@@ -260,7 +260,7 @@ class MotionDesign(Design):
             adjoint, bars = step.backward(bars, pull)
             size = np.append(step.magnitudes(), [np.abs(w).max()] * read_here)
             found = Differences(partial(equations, step, w), p, h, STENCIL, CHANGED * size).of(
-                [(members, np.append(np.tile(of, len(adjoint) // len(of)), [-1] * read_here))
+                [(members, np.append(np.tile(of, len(adjoint) // len(of)), np.full(read_here, -1)))
                  for members, of in groups])
             step.require_held(found[c.fixed].toarray())
             out += np.append(-adjoint, [1.0] * read_here) @ found
