@@ -130,7 +130,7 @@ def test_many_heights_by_one_adjoint_solution(scheme):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_the_last_value_alone_by_fields(scheme):
     """Instants that the objective does not read, and a start that no height changes."""
-    scene = Scene(beam_of(mesh=MeshBeam.init_line([0, 0.5, 1], 0.05))).clamp("left")
+    scene = Scene(beam_of(mesh=MeshBeam.init_line(np.linspace(0, 1, 9), 0.05))).clamp("left")
     scene.gravity((0, -9.81)).sensor("tip", "displacement", at=(1, 0))
     heights = Parameters(scene, [(scene.beams[0], "height", "nodes")])
     design = MotionDesign(heights, ["tip"], 0.04, 0.01, scheme)
