@@ -37,7 +37,7 @@ def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
 def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:
     """Largest height, heights (4, ne) in the elements, and the function; None for a number."""
     if not callable(height):
-        if isinstance(height, (list, tuple, np.ndarray)):
+        if isinstance(height, (list, tuple)) or getattr(height, "ndim", 0) > 0:
             raise InputError("height is a number, or a function of parameters (n,), got "
                              f"{shown(height)}: for heights at nodes, height=lambda x: "
                              "np.interp(x, nodes, heights)")
