@@ -984,14 +984,6 @@ class Scene(Model):
         >>> live = column.replace(loads=[PointForce((-euler, 0), at=(2, 0))])
         >>> live.buckling(1, dead).factors.round(3).tolist()
         [0.6]
-
-        Raises
-        ------
-        InputError
-            If there is no positive factor, or loads without a potential cause flutter first; if the
-            state is unstable or has other supports.
-        SupportError
-            If a rigid motion is not constrained.
         """
         with self._lock:
             if state is not None:
