@@ -216,7 +216,8 @@ class LinearModel:
             raise SupportError(f"there is no static response, at the frequency 0: {missing}")
         if modes is not None:
             A, B, C, D, _ = self.state_space(modes)
-            values = C @ np.linalg.solve(1j * omega[:, None, None] * np.eye(len(A)) - A, B[None]) + D
+            dynamic = 1j * omega[:, None, None] * np.eye(len(A)) - A
+            values = C @ np.linalg.solve(dynamic, B[None]) + D
             return FrequencyResponse(omega, values, tuple(self.inputs), tuple(self.outputs))
         dynamic = self._dynamic
         out = np.empty((len(omega), len(self.outputs), len(self.inputs)), complex)
