@@ -196,8 +196,12 @@ class Constraints:
 
     def constraint(self, u: Array, t: float | None) -> Array:
         """Phi, shape (m,)."""
-        if not self.tabled:
-            return np.concatenate([np.zeros(0), *(joint.value(u, t) for joint in self.joints)])
+        return self._by_tables(u, t) if self.tabled else self._by_joints(u, t)
+
+    def _by_joints(self, u, t):
+        return np.concatenate([np.zeros(0), *(joint.value(u, t) for joint in self.joints)])
+
+    def _by_tables(self, u, t):
         (rows, columns, values), offset = self._slopes_at(t), self._still[0]
         if self.drives:
             offset = np.concatenate([x.offset(np.array([t]), self.N)[0] for x in self.joints])
@@ -236,23 +240,14 @@ class Constraints:
         k, i, j, v = self.seconds
         for t in times:
             u = 0.1 * sizes * rng.standard_normal(self.N)
-            slope = self._to_sparse(*self._slopes_at(t))
-            J = slope + self._to_sparse(k, i, v * u[j])
-            offset = np.concatenate([one.offset(np.array([t]), self.N)[0] for one in self.joints])
-            phi = np.concatenate([one.value(u, t) for one in self.joints])
+            J = self._to_sparse(*self._slopes_at(t)) + self._to_sparse(k, i, v * u[j])
             gap = J - self._to_sparse(*self._in_order(one.entries(u, t) for one in self.joints))
-            if not (np.all(np.abs(offset + 0.5 * (J + slope) @ u - phi) <= 1e-9 * of_equations)
+            phi = self._by_tables(u, t) - self._by_joints(u, t)
+            if not (np.all(np.abs(phi) <= 1e-9 * of_equations)
                     and (abs(gap) @ sizes <= 1e-9 * (abs(J) @ sizes)).all()):
                 return False
-
-        def quadratic(s: float, t: float) -> Array:
-            offset = np.concatenate([one.offset(np.array([t]), self.N)[0] for one in self.joints])
-            J = self._to_sparse(*self._slopes_at(t))
-            return offset + s * (J @ d) + 0.5 * s * s * np.bincount(k, v * d[i] * d[j], self.m)
-
         d = everywhere(sizes)
-        return is_table(lambda u, t: np.concatenate([one.value(u, t) for one in self.joints]), d,
-                        quadratic, of_equations)
+        return is_table(self._by_joints, d, lambda s, t: self._by_tables(s * d, t), of_equations)
 
     @cached_property
     def _still(self):

@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.source import source
+from ..core.types import Array
 
 # the rule
 
@@ -42,6 +43,11 @@ def is_small(size, contraction, tol, reference, noise):
 def is_balanced(residual, force, joint_gap, tol, noise):
     """True if the norm of a residual, and the residual of joints, are within tolerance."""
     return residual <= tol * force + noise and joint_gap <= CLOSED
+
+
+def joint_gap(phi: Array, sizes: Array) -> float:
+    """The largest relative residual of joints phi (m,), whose equations have these sizes (m,)."""
+    return float(np.max(np.abs(phi) / sizes, initial=0.0))
 
 
 # equilibria: from the first residual to the last

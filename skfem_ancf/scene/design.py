@@ -457,10 +457,12 @@ def require_regular(state: State, force: Array, soft: Array) -> None:
                          f"the stiffness of its material, {resists:.1g}, so that derivatives have "
                          "no bounds. Take another load, or CriticalLoad() as reading")
     contacts = system.forces.contacts
+    if not contacts.groups:
+        return
+    largest = np.abs(system.internal_force(u, None, state.load)
+                     * system.constraints.coordinate_sizes).max() / system.size
     for (_, group), (_, x, push, _, gap) in zip(contacts.groups, contacts.pushes(
             u, None, state.load)):
-        largest = np.abs(system.internal_force(u, None, state.load)
-                         * system.constraints.coordinate_sizes).max() / system.size
         i = group.first + 2 * np.arange(len(group.weights))[:, None]
         # a point that supports hold can neither lift nor press
         moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))

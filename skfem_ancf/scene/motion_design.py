@@ -327,8 +327,7 @@ class _Step:
             if static is not None:
                 first = residual(system, y.u, static.multipliers, static.load)
             last = _residual(y.t, system, y.u, y.acceleration, y.multipliers, y.v)[:c.N]
-        rest = np.concatenate([first, M(y.v - v) + J.T @ self._impulse, rate, last, bend])
-        return rest
+        return np.concatenate([first, M(y.v - v) + J.T @ self._impulse, rate, last, bend])
 
     def require_held(self, change: Array) -> None:
         """Raise InputError if derivatives of supports by parameters are not zero."""

@@ -14,7 +14,7 @@ from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrup
 from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.types import Array
-from ..equations.convergence import is_balanced, is_small, rules_of
+from ..equations.convergence import is_balanced, is_small, joint_gap, rules_of
 from ..equations.evaluation import invert
 from ..equations.stability import position_weights
 from ..equations.system import System
@@ -266,7 +266,7 @@ class Tracer:
         e, rules, weights = self.system.backend.tables.plain, self.rules, self.system.K.diagonal()
         invert(weights, e.sizes)
         norms = np.sqrt([x * x @ weights for x in (residual * e.free, *forces)])
-        gap = np.max(np.abs(phi) / e.joints.sizes, initial=0.0)
+        gap = joint_gap(phi, e.joints.sizes)
         return bool(is_balanced(norms[0], norms[1:].max(), gap, rules.tol, rules.force_noise))
 
     def correct(self, start: Point, first: tuple[Any, Any, Any], increment: Callable[..., float],

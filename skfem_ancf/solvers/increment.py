@@ -11,7 +11,7 @@ from ..core.errors import ConvergenceError
 from ..core.band import NO_FACTORS
 from ..core.types import Array
 from ..equations import stability
-from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, rules_of
+from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, joint_gap, rules_of
 from ..equations.evaluation import Target
 from ..equations.system import System
 from . import descent
@@ -116,8 +116,8 @@ class Increment:
         target, *_ = self._target(tables, u, multipliers, system.solver)
         force = system.internal_force(u, self.time, self.load)
         missing = self.load * system.external_force(u) - force
-        gaps = np.abs(system.constraints.constraint(u, self.load)) / tables.plain.joints.sizes
-        still = not target.moving and np.max(gaps, initial=0.0) <= CLOSED
+        gap = joint_gap(system.constraints.constraint(u, self.load), tables.plain.joints.sizes)
+        still = not target.moving and gap <= CLOSED
         rests = still and stability.is_nothing(system, missing)
         return Equilibrium(u, multipliers, force) if rests else None
 

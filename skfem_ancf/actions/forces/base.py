@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any, NamedTuple
 
 from ...beam.layout import Layout
@@ -135,23 +136,19 @@ class ForceElement(BoundForce, Item):
 
     def bound_on(self, layout: Layout) -> list[Any]:
         bound = self._thawed()
-        if is_builtin(self) and bound.parts.__func__ is not BoundForce.parts:
-            bound.links = list(bound.bind(layout))
-            if bound.parts() is None and bound.entries is None:  # a user's law, as k(elongation)
-                try_force(bound)
-            bound._freeze()
-            return [bound]
+        known = is_builtin(self) and bound.parts.__func__ is not BoundForce.parts
         hint = ("a force element defines bind(scene), which returns a list of points, and force(x, "
                 "v, t) of shape (points, 2)")
-        with explained("{!r} fails in the reference configuration", hint, InputError, self):
+        with nullcontext() if known else explained(
+                "{!r} fails in the reference configuration", hint, InputError, self):
             bound.links = links = bound.bind(layout)
-            if not isinstance(links, (list, tuple)) or not links or not all(
-                    isinstance(x, Vector) for x in links):
+            if not known and (not isinstance(links, (list, tuple)) or not links or not all(
+                    isinstance(x, Vector) for x in links)):
                 raise InputError(
                     f"bind(scene) of {self!r} must return a list of points and sections, as "
                     "[point(scene, None, (1, 0))] with skfem_ancf.actions.forces.point, got "
                     f"{shown(links)}")
-            if bound.parts() is None and bound.entries is None:
+            if bound.parts() is None and bound.entries is None:  # also for a user's law of a spring
                 try_force(bound)
             bound._freeze()
             return [bound, *user_parts(bound, layout, force=False)]
