@@ -307,10 +307,8 @@ def derivative(function: Callable[[Array], Any], x: Array) -> Array:
 
 
 class Remembering:
-    """A bound force element with a memory, at one history: as one without memory.
-
-    ``history`` (k,) is that at the start of an increment, ``span`` (1,) the time since.
-    """
+    """A bound force element with a memory, at one history: as one without memory. ``history`` (k,)
+    is that at the start of an increment, ``span`` (1,) the time since."""
 
     def __init__(self, element: Any) -> None:
         self.element = element
@@ -519,10 +517,8 @@ def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int)
 
 
 def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array) -> None:
-    """Call a check of derivatives at two generic displacements.
-
-    It may fail at one of them, where there may be a kink.
-    """
+    """Call a check of derivatives at two generic displacements. It may fail at one of them, where
+    there may be a kink."""
     angles = np.arange(len(sizes))
     try:
         check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))
@@ -559,10 +555,8 @@ def is_table(value: Callable[[Array, float], Array], u: Array,
 # user-defined items
 
 class UserForce(BoundForce):
-    """Energy, force and mass of a user-defined item, on pairs of its degrees of freedom.
-
-    ``past`` are history and time of an increment, of an item with a memory.
-    """
+    """Energy, force and mass of a user-defined item, on pairs of its degrees of freedom. ``past``
+    are history and time of an increment, of an item with a memory."""
 
     def __init__(self, item: Any, layout: Layout) -> None:
         if hasattr(item, "start"):

@@ -30,11 +30,9 @@ VARIABLES = np.array([[0, 2, 3], [1, 4, 5]])
 
 
 class DensityPoints(NamedTuple):
-    """Quadrature points of n elements or facets.
-
-    ``dofs`` (n, 2 nb), material points ``X`` (2, n, np), ``weights`` (n, np), values and both
-    derivatives of the local ``functions`` (n, nb, np, 3), and additional data ``of``.
-    """
+    """Quadrature points of n elements or facets. ``dofs`` (n, 2 nb), material points ``X`` (2, n,
+    np), ``weights`` (n, np), values and both derivatives of the local ``functions`` (n, nb, np, 3),
+    and additional data ``of``."""
 
     dofs: Array
     X: Array
@@ -165,10 +163,8 @@ def _in_two(gradient):
 def by_loops(psi: Any, gradient: Any, hessian: Any,
              height: float) -> dict[str, Callable[..., Any]]:
     """Compiled functions of one point as functions of arrays, with missing derivatives of psi.
-
     First derivatives are complex steps, second ones differences of these, with steps relative to
-    the height.
-    """
+    the height."""
     from numba import njit
 
     steps = REAL * np.array([height] * 2 + [1.0] * 4)

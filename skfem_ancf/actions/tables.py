@@ -21,12 +21,9 @@ MATERIALS = 2
 
 
 class JointTables(NamedTuple):
-    """The joints of a scene.
-
-    ``hk, hi, hj, hv`` are H by equation, row, column and value, both halves; ``gk, gi`` equation
-    and column of each entry of g; ``sizes`` scale the residual of each equation; ``custom`` is the
-    handle of joints that are not quadratic, 0 for none.
-    """
+    """The joints of a scene. ``hk, hi, hj, hv`` are H by equation, row, column and value, both
+    halves; ``gk, gi`` equation and column of each entry of g; ``sizes`` scale the residual of each
+    equation; ``custom`` is the handle of joints that are not quadratic, 0 for none."""
 
     hk: I1
     hi: I1
@@ -239,10 +236,8 @@ def mean_external_force(loads, factors, t, u0, u1, out):
 
 @apart("statics", LoadTables, F1, float, float, F1, Band)
 def add_load_stiffness(loads, factors, t, scale, u, A):
-    """Subtract the derivative of :func:`external_force` from a band matrix.
-
-    If only the lower half is stored, symmetric entries come first, then the upper half.
-    """
+    """Subtract the derivative of :func:`external_force` from a band matrix. If only the lower half
+    is stored, symmetric entries come first, then the upper half."""
     lower = A.flat[A.top:]
     if loads.moments.M.size > 0:
         add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)

@@ -45,9 +45,7 @@ def require_cable(beam: Any) -> None:
 
 def locate(beam: Any, point: Any) -> tuple[int, Array]:
     """The element of a material point (x, y) or named end, and its point (xi, eta) of the cell.
-
-    Raises MeshError outside of the beam.
-    """
+    Raises MeshError outside of the beam."""
     e, X, _ = beam.finder.inside(as_point(point, beam.mesh)[:, None])
     return int(e[0]), X[:, 0]
 
@@ -83,10 +81,8 @@ def entries_of(dofs: Array) -> tuple[Array, Array]:
 
 
 def direction(beam: Any, node: int) -> tuple[Array, Array]:
-    """DOFs (2, n) and weights (n,) of ``12 / h^3 int Y r dY`` of a section.
-
-    For a cable, those of the tangent.
-    """
+    """DOFs (2, n) and weights (n,) of ``12 / h^3 int Y r dY`` of a section. For a cable, those of
+    the tangent."""
     if not beam.has_sections:
         return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
     eta, w = gauss(beam.element.order + 1)
@@ -162,10 +158,8 @@ def shortest(beam: Any, u: Array) -> float:
 
 
 def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
-    """det F and principal stretches at the integration points.
-
-    They are linear in a :func:`~skfem_ancf.core.linear.step`.
-    """
+    """det F and principal stretches at the integration points. They are linear in a
+    :func:`~skfem_ancf.core.linear.step`."""
     if not beam.has_sections:
         along = beam.kernel.outer_stretches(u)
         ratio = beam.across.layers[0].material.lateral_ratio
@@ -198,10 +192,8 @@ def ends(beam: Any, q: Array) -> tuple[Array, Array]:
 
 
 def bent(beam: Any, u: Array) -> tuple[float, bool]:
-    """Largest rotation of the axis over an element, and True if it folds back within one.
-
-    Then a chord is opposite to a tangent at its end.
-    """
+    """Largest rotation of the axis over an element, and True if it folds back within one. Then a
+    chord is opposite to a tangent at its end."""
     (left, right), slopes = ends(beam, beam.q0_local + u)
     back = (right - left).conj() * slopes
     turn = slopes[1] * slopes[0].conj() * beam._turned_back

@@ -42,10 +42,8 @@ ON_AXIS = 1e-12
 
 
 class BeamPoints:
-    """Points ``X`` (2, n) of the reference cells of elements ``e`` (n,) of one beam.
-
-    Among the requested points they have the numbers ``index`` (n,), None if they are all.
-    """
+    """Points ``X`` (2, n) of the reference cells of elements ``e`` (n,) of one beam. Among the
+    requested points they have the numbers ``index`` (n,), None if they are all."""
 
     def __init__(self, beam: Any, number: int, dofs: slice, index: Array | None,
                  e: Array, X: Array) -> None:

@@ -24,10 +24,8 @@ BEGIN, END, SAMPLES, SPAN, BEGIN_GRADIENTS, END_GRADIENTS, KIND = range(7)
 
 
 class Body:
-    """The beams of a scene: their :class:`StrainTables`, and a table with a row for each.
-
-    A ``kernel`` has the same tables.
-    """
+    """The beams of a scene: their :class:`StrainTables`, and a table with a row for each. A
+    ``kernel`` has the same tables."""
 
     def __init__(self, packs: Sequence[StrainTables], table: Any, kernel: Any = None,
                  elements: Sequence[Elements] | None = None) -> None:
@@ -59,11 +57,8 @@ def tables_of(body, k):
 
 
 def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = False) -> Body:
-    """The Body of beams with their slices of DOFs.
-
-    With ``joined``, tables with the same samples are merged, so that many short beams are as fast
-    as a long one.
-    """
+    """The Body of beams with their slices of DOFs. With ``joined``, tables with the same samples
+    are merged, so that many short beams are as fast as a long one."""
     if len(beams) == 1:
         return _body([beams[0].kernel.tables], lambda t: t.rows.shape[1], beams[0].kernel)
     tables = [[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
@@ -103,9 +98,7 @@ def _body(tables, numbers, kernel=None):
 
 def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float]) -> Body:
     """The Body of viscous stresses for the beams' retardation times; ``body`` if all are zero.
-
-    Stresses have the same positions as in ``body``.
-    """
+    Stresses have the same positions as in ``body``."""
     packs: list[StrainTables] = []
     rows, first = [], 0
     for beam, time in zip(beams, times):
@@ -120,9 +113,7 @@ def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float])
 
 def copies_of(body: Body, n: int, N: int) -> Body:
     """The Body of n copies of the beams, with an offset of N between their DOFs; without tangents.
-
-    Few elements are faster in one call.
-    """
+    Few elements are faster in one call."""
     table = body.table.copy()
     table[:, [BEGIN, END]] *= n
     return Body(tuple(repeated(t, n, N) for t in body.packs), table)
@@ -169,10 +160,8 @@ def body_force(body, u, f):
 
 @source
 def body_tangent(body, u, f, independent, use_independent, stresses, A):
-    """Internal force, lower half of the tangent without loads, and stresses.
-
-    The geometric part uses the independent stresses if ``use_independent``.
-    """
+    """Internal force, lower half of the tangent without loads, and stresses. The geometric part
+    uses the independent stresses if ``use_independent``."""
     clear(f)
     clear(A.flat)
     given = independent if use_independent else independent[:0]
@@ -233,10 +222,8 @@ def body_mean(body, u0, u1, f):
 
 @source
 def body_mixed(body, mean, u0, u1, f, independent, stresses):
-    """As :func:`body_force` at u1, or :func:`body_mean`, but for independent stresses.
-
-    The stresses of the strain are written.
-    """
+    """As :func:`body_force` at u1, or :func:`body_mean`, but for independent stresses. The stresses
+    of the strain are written."""
     clear(f)
     for k in range(body.table.shape[0]):
         given, out = _stress(body, k, independent), _stress(body, k, stresses)

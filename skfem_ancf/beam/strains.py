@@ -199,11 +199,9 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
 
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:
-    """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements.
-
-    X is (2, npoints) or (2, nelements, npoints), tind the elements or None for all; the result is
-    (3, nelements, npoints).
-    """
+    """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements. X is (2, npoints) or
+    (2, nelements, npoints), tind the elements or None for all; the result is (3, nelements,
+    npoints)."""
     tind = np.arange(beam.mesh.nelements) if tind is None else tind
     shape = len(tind), X.shape[-1]
     points = X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0])
@@ -238,11 +236,8 @@ def stretched(xx: Array) -> tuple[Array, Array]:
 
 
 def cable_axis(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Any, Any, Any, Any]:
-    """The axis of a cable at xi (n,) of elements e (n,).
-
-    Unit tangents before and after, (2, 2, n); stretch - 1, change of curvature, and initial
-    curvature, (n,).
-    """
+    """The axis of a cable at xi (n,) of elements e (n,). Unit tangents before and after, (2, 2, n);
+    stretch - 1, change of curvature, and initial curvature, (n,)."""
     L, basis = beam.mesh.lengths[e], beam.interpolation
     derivatives = []
     for q in (beam.q0_local, u):

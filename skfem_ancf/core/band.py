@@ -58,9 +58,7 @@ class Inertia(NamedTuple):
 
 def beside_zero(negative: Callable[[float], int]) -> Inertia:
     """The :class:`Inertia` from ``negative(shift)``, a count for a relative shift of the diagonal.
-
-    An eigenvalue that changes sign between two shifts of round-off is zero.
-    """
+    An eigenvalue that changes sign between two shifts of round-off is zero."""
     below, above = negative(-SINGULAR), negative(SINGULAR)
     return Inertia(above, below != above)
 
@@ -108,11 +106,9 @@ class BandMatrix(Band):
         self.factors = None
 
     def add_elements(self, K: Array, start: int, nd: int, left: Array) -> None:
-        """Add matrices K (ne, 2 nd, 2 nd) that couple node k and k + 1 of a chain.
-
-        ``start`` is the first row of node 0, ``nd`` the number of DOFs of a node, ``left`` (ne,)
-        the increasing left nodes. K is overwritten if the matrix is symmetric.
-        """
+        """Add matrices K (ne, 2 nd, 2 nd) that couple node k and k + 1 of a chain. ``start`` is the
+        first row of node 0, ``nd`` the number of DOFs of a node, ``left`` (ne,) the increasing left
+        nodes. K is overwritten if the matrix is symmetric."""
         m, item, ld = 2 * nd, self.flat.itemsize, self.ld
         if self.symmetric:  # the upper half would overlap other entries
             K *= np.tri(m)
@@ -207,11 +203,9 @@ class BandMatrix(Band):
         return self.factors.flat[::self.ld].copy()
 
     def inertia(self) -> Inertia:
-        """Inertia of a symmetric matrix, by Sylvester's law.
-
-        If Cholesky fails, the matrix is eliminated block by block along the chain; blocks whose
-        elimination lets entries grow are merged with the next. ValueError if it is not symmetric.
-        """
+        """Inertia of a symmetric matrix, by Sylvester's law. If Cholesky fails, the matrix is
+        eliminated block by block along the chain; blocks whose elimination lets entries grow are
+        merged with the next. ValueError if it is not symmetric."""
         if not self.symmetric:
             raise ValueError("the inertia needs a symmetric matrix")
         if self.factors is None:
@@ -300,9 +294,8 @@ class BandMatrix(Band):
 
 class CoupledBand(BandMatrix):
     """A band matrix with entries anywhere, in NumPy alone: sparse factors while there are any.
-
-    ``entries()`` returns rows, columns and values (k,) each; of a symmetric matrix of both halves.
-    """
+    ``entries()`` returns rows, columns and values (k,) each; of a symmetric matrix of both
+    halves."""
 
     entries: Callable[[], tuple[Array, Array, Array]]
     lu: Any = None
@@ -362,11 +355,8 @@ def add_multiple(c, x, y):
 
 @primitive("skfem_ancf.core.loops")
 def factorize(A):
-    """Factorise in place; False if a pivot is round-off.
-
-    Only LAPACK's storage is pivoted. An indefinite symmetric matrix has L D L^T factors unless a
-    leading submatrix is singular.
-    """
+    """Factorise in place; False if a pivot is round-off. Only LAPACK's storage is pivoted. An
+    indefinite symmetric matrix has L D L^T factors unless a leading submatrix is singular."""
     if isinstance(A, CoupledBand):
         if not A.factorize_all():
             return False
@@ -385,11 +375,8 @@ def factorize(A):
 
 
 def _eliminate(A):
-    """L D L^T of an indefinite symmetric matrix.
-
-    Entries of a row are ld - 1 apart, so that the next columns form a strided square, whose upper
-    triangle belongs to other entries.
-    """
+    """L D L^T of an indefinite symmetric matrix. Entries of a row are ld - 1 apart, so that the
+    next columns form a strided square, whose upper triangle belongs to other entries."""
     columns = as_lapack(A).T
     n, stride = len(columns), columns.itemsize
     lower = np.tri(min(A.width, n - 1)).T  # rows are columns
@@ -426,11 +413,9 @@ def dense_solve(A, b):
 
 @primitive("skfem_ancf.core.loops")
 def solve_dependent(S, b):
-    """Solve in place of b a system S (m, m) with redundant equations.
-
-    S is scaled to a unit diagonal and eliminated with complete pivoting down to round-off; b
-    becomes the minimum-norm solution in that scale. False if S is zero or not finite.
-    """
+    """Solve in place of b a system S (m, m) with redundant equations. S is scaled to a unit
+    diagonal and eliminated with complete pivoting down to round-off; b becomes the minimum-norm
+    solution in that scale. False if S is zero or not finite."""
     m, size = b.size, np.abs(np.diagonal(S)).copy()
     size[size == 0.0] = 1.0
     size = np.sqrt(size)
@@ -515,11 +500,8 @@ def solve_many(A: Band, B: Array, X: Array) -> None:
 
 @primitive("skfem_ancf.core.loops")
 def factorize_complex(A, width):
-    """L D L^T of a complex symmetric band in place; False if it fails.
-
-    A has real parts, then imaginary parts, each as in a symmetric :class:`Band` of half bandwidth
-    ``width``.
-    """
+    """L D L^T of a complex symmetric band in place; False if it fails. A has real parts, then
+    imaginary parts, each as in a symmetric :class:`Band` of half bandwidth ``width``."""
     ld = width + 1 + SPARE
     n, flat = A.size // (2 * ld), np.append(_complex(A), np.zeros((width + 1) * ld))
     for j in range(n):

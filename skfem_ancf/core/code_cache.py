@@ -117,10 +117,8 @@ def note(name: str) -> None:
 
 @contextmanager
 def verified(place: Path, name: str) -> Iterator[None]:
-    """Around work that uses the cached files of a function: removes those that have been damaged.
-
-    A checksum lies beside each file, since Numba runs what it finds in it.
-    """
+    """Around work that uses the cached files of a function: removes those that have been damaged. A
+    checksum lies beside each file, since Numba runs what it finds in it."""
     def files():
         return place.glob(f"*.{name}-*.nb[ci]")
 

@@ -146,11 +146,9 @@ def load_part(part: str) -> None:
 
 
 class Record(types.NamedTuple):
-    """A named tuple by the address of its :class:`~skfem_ancf.core.words.Words`.
-
-    Fields are read where they are used. Tuples of many arrays by value take Numba ten times as
-    long, since it counts all references.
-    """
+    """A named tuple by the address of its :class:`~skfem_ancf.core.words.Words`. Fields are read
+    where they are used. Tuples of many arrays by value take Numba ten times as long, since it
+    counts all references."""
 
     dtype = types.int64  # of the words
 
@@ -245,11 +243,9 @@ def compiled(function: Any) -> Any:
 
 
 def entry(function: Any, args: Any) -> Any:
-    """A compiled function for Python, for arguments of these types; named tuples become words.
-
-    If the first argument is a named tuple, the function takes the address of its words. Named
-    tuples of numbers are passed as these.
-    """
+    """A compiled function for Python, for arguments of these types; named tuples become words. If
+    the first argument is a named tuple, the function takes the address of its words. Named tuples
+    of numbers are passed as these."""
     names: dict[str, Any] = {"function": njit(inline="always", **OPTIONS)(function)}
     takes, given, signature = list[str](), list[str](), list[Any]()
     for k, x in enumerate(args):
@@ -312,10 +308,8 @@ def _words(x, known):
 
 def address(function: Any, hints: Any, name: str = "", kept: bool = True,
             returns: Any = None) -> int:
-    """The address of a compiled function with annotated arguments, see :func:`caller`.
-
-    ``name`` distinguishes it on disk; it is cached if ``kept``.
-    """
+    """The address of a compiled function with annotated arguments, see :func:`caller`. ``name``
+    distinguishes it on disk; it is cached if ``kept``."""
     signature, function = SCALARS[returns](*map(type_of, hints)), _named(function, name)
 
     def made(**options):

@@ -23,10 +23,8 @@ T = TypeVar("T")
 
 
 class Words:
-    """The words of a named tuple, which live as long as this object.
-
-    Fields are contiguous arrays of floats or integers, numbers, named tuples or their Words.
-    """
+    """The words of a named tuple, which live as long as this object. Fields are contiguous arrays
+    of floats or integers, numbers, named tuples or their Words."""
 
     def __init__(self, x: tuple[Any, ...]) -> None:
         found: list[int] = []

@@ -21,12 +21,9 @@ NEAR = 3e-3
 
 
 class _Tableau:
-    """Coefficients of a collocation method.
-
-    ``bends`` (2, n + 1) are the weights of dt^2 times the highest derivative of the acceleration
-    and the one below. They apply to Z and to the acceleration at the end of the step (at the start
-    if the last point is the end).
-    """
+    """Coefficients of a collocation method. ``bends`` (2, n + 1) are the weights of dt^2 times the
+    highest derivative of the acceleration and the one below. They apply to Z and to the
+    acceleration at the end of the step (at the start if the last point is the end)."""
 
     def __init__(self, points: Array) -> None:
         c, n = points, len(points)

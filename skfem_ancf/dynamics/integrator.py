@@ -99,11 +99,9 @@ class TimeStepFailed(Exception):
 
 
 class Integrator:
-    """Integrates a system by one-step schemes.
-
-    The iteration matrix is factorised again only when the iteration contracts too slowly. ``limit``
-    is the last time at which functions of time are sampled, ``longest`` the size of a block.
-    """
+    """Integrates a system by one-step schemes. The iteration matrix is factorised again only when
+    the iteration contracts too slowly. ``limit`` is the last time at which functions of time are
+    sampled, ``longest`` the size of a block."""
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         scheme.require(system)
@@ -180,10 +178,8 @@ class Integrator:
 
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
               history: Array | None = None) -> Motion:
-        """The initial Motion, with consistent velocity, acceleration and multipliers.
-
-        Rates of functions of time are those in a step dt after t, or before t unless ``ahead``.
-        """
+        """The initial Motion, with consistent velocity, acceleration and multipliers. Rates of
+        functions of time are those in a step dt after t, or before t unless ``ahead``."""
         s, M, (free, m) = self.system, self.system.mass, (self.system.constraints.free, self.m)
         instant = TimeFunctions(s, np.array([0.0 if ahead else 1.0]), SAMPLES)
         given = instant.of(t if ahead else t - dt, dt, (0, 1), self.limit)
@@ -258,9 +254,8 @@ class Integrator:
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> list[Motion]:
         """Take up to ``n`` steps from the Motion ``y`` at ``start + first dt``; fewer if one fails.
-
-        Functions of time are sampled for all steps ``range(*block)`` at once; by default for these.
-        """
+        Functions of time are sampled for all steps ``range(*block)`` at once; by default for
+        these."""
         s, begun = self.system, y.t if start is None else start
         given = self._functions.of(begun, dt, (first, first + n), self.limit, block)
         lasting = s.histories.lasting
@@ -292,11 +287,9 @@ class Integrator:
 
     def _call(self, function: Callable, y: Motion, dt: float, out: tuple[Array, Array],
               *args: Any) -> int:
-        """Call a compiled function that takes steps; returns how many succeeded.
-
-        On Ctrl-C it counts the steps that are complete in the arrays ``out`` of NaN, the first of
-        which has the displacements, and sets ``stopped``.
-        """
+        """Call a compiled function that takes steps; returns how many succeeded. On Ctrl-C it
+        counts the steps that are complete in the arrays ``out`` of NaN, the first of which has the
+        displacements, and sets ``stopped``."""
         s, state, before, rows = self.system, self._state, np.array(self._state), out[0]
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
@@ -381,11 +374,9 @@ class Integrator:
         return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
 
     def leap(self, y: Motion, dt: float) -> Motion | None:
-        """A longer step past a singular position of the joints, or None.
-
-        For example, all bars of a linkage may be collinear: steps that end there do not converge.
-        Collocation, which linearises joints once per step, uses an energy-momentum step here.
-        """
+        """A longer step past a singular position of the joints, or None. For example, all bars of a
+        linkage may be collinear: steps that end there do not converge. Collocation, which
+        linearises joints once per step, uses an energy-momentum step here."""
         system = self.system
         if not self.m or system.forces.contacts.obstacles or system.histories.evolve:
             return None

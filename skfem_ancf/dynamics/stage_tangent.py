@@ -17,10 +17,8 @@ from .records import JointMotions, add_damping, row_of
 # named tuples of collocation: coefficients, prescribed functions, work arrays
 
 class Method(NamedTuple):
-    """Coefficients of a method of n points and k eigenvalues, one of each conjugate pair.
-
-    Complex numbers have a first axis of length 2: real and imaginary part.
-    """
+    """Coefficients of a method of n points and k eigenvalues, one of each conjugate pair. Complex
+    numbers have a first axis of length 2: real and imaginary part."""
 
     points: F1  # c, (n,)
     weights: F1  # b, (n,)
@@ -217,10 +215,8 @@ def solve_for(w, k, x, y):
 
 @source
 def join(method, s, w, k, r, q, x, y):
-    """Correct x + i y, solved with the band, by forces r along the low-rank rows J.
-
-    For joints ``mu / h J x = -gap``; the force of other rows is ``C J x``.
-    """
+    """Correct x + i y, solved with the band, by forces r along the low-rank rows J. For joints ``mu
+    / h J x = -gap``; the force of other rows is ``C J x``."""
     m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
     p, z = method.values[0, k], method.values[1, k]
     c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
@@ -249,10 +245,8 @@ def join(method, s, w, k, r, q, x, y):
 
 @source
 def _combine(K, M, D, fixed, c, m, d, out):
-    """``c K + m M + d D`` with the supports fixed, the lower half of each column.
-
-    Of an unsymmetric K, its symmetric part; the iteration corrects the rest.
-    """
+    """``c K + m M + d D`` with the supports fixed, the lower half of each column. Of an unsymmetric
+    K, its symmetric part; the iteration corrects the rest."""
     ld, top = K.width + 1 + SPARE, K.top
     n, x, y, z = out.size // ld, K.flat, M.flat, D.flat
     columns = shaped(out, (n, ld))

@@ -43,9 +43,7 @@ ROUGHLY, EXACTLY = range(2)
 @apart("joints", *ALL, int, returns=int)
 def end_velocity(e, matrices, rule, s, w, state, exact):
     """v_1 = v - M^-1 J^T impulse of the iterate, with d Phi / dt = 0; FAILED for dependent joints.
-
-    Unless ``exact``, the accuracy is that of the iteration.
-    """
+    Unless ``exact``, the accuracy is that of the iteration."""
     free_velocity(e.free, rule, s, w)
     drive_rate(e.joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
     if rule.mass_solver > 0:
@@ -59,11 +57,9 @@ def end_velocity(e, matrices, rule, s, w, state, exact):
 
 @source
 def _eliminated(joints, rule, s, w, at, b, x, state, exact):
-    """Change x by ``-M^-1 J^T b`` so that ``J1 x`` becomes the initial -b, for eliminated joints.
-
-    J is taken at the displacement ``at``, J1 at the end of the step. The change is also in
-    ``w.x.damping_velocity``. FAILED for dependent joints.
-    """
+    """Change x by ``-M^-1 J^T b`` so that ``J1 x`` becomes the initial -b, for eliminated joints. J
+    is taken at the displacement ``at``, J1 at the end of the step. The change is also in
+    ``w.x.damping_velocity``. FAILED for dependent joints."""
     change, rate = w.x.damping_velocity, w.m.phi
     add_constraint_rate(joints, s.joints.g[0], s.t, w.x.u, x, b)
     for k in indices(b.size):
@@ -128,11 +124,9 @@ def close_acceleration(e, matrices, rule, s, w, state):
 
 @apart("damping", *ALL)
 def add_work(e, matrices, rule, s, w, state):
-    """Add the work of damping at the mean velocity of the step.
-
-    In the conserving scheme this is the work of its force. In others the mean force of both ends
-    could have negative work, because of unresolved vibrations.
-    """
+    """Add the work of damping at the mean velocity of the step. In the conserving scheme this is
+    the work of its force. In others the mean force of both ends could have negative work, because
+    of unresolved vibrations."""
     u, u0, d, middle = w.x.u, w.y[0], w.x.damping, w.x.middle
     damping_velocity = w.x.damping_velocity
     for i in indices(u.size):
@@ -176,11 +170,9 @@ def finish(e, matrices, rule, s, w, state):
 
 @source
 def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _):
-    """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded.
-
-    Written for each step: work of damping and history, (n, 1 + k); u, v, a and w, (n, 4, N);
-    multipliers at the end and where they were evaluated, (n, 2, m).
-    """
+    """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded. Written
+    for each step: work of damping and history, (n, 1 + k); u, v, a and w, (n, 4, N); multipliers at
+    the end and where they were evaluated, (n, 2, m)."""
     contacts, taken = e.forces.contacts, np.empty(1)
     for n in range(rows.shape[0]):
         s = step_of(e.joints, rule, data, n)
@@ -273,9 +265,7 @@ def _end(e, matrices, rule, s, w, state):
 @apart("motion", *ALL, F1)
 def _predict(e, matrices, rule, s, w, state, limits):
     """Set all that does not depend on u_1, and the initial guess with the acceleration at 0.
-
-    ``limits`` get the reference of the tolerance, and the round-off of a correction.
-    """
+    ``limits`` get the reference of the tolerance, and the round-off of a correction."""
     h, u, guess, straight = s.dt, w.x.u, w.x.guess, w.x.straight
     base, speed, rest, constrained = w.x.base, w.x.speed, w.x.rest, w.x.constrained
     u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]

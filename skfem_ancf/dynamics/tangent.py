@@ -153,10 +153,8 @@ def add_impulses(e, matrices, rule, s, w, state):
 @apart("motion", *ALL)
 def tangent(e, matrices, rule, s, w, state):
     """Assemble the iteration matrix, with the stresses at the start, or mean independent stresses.
-
     Stresses of an iterate may be far off: a straight prediction of a rotation stretches the beam.
-    So may be independent stresses at the end of a step that does not resolve axial vibrations.
-    """
+    So may be independent stresses at the end of a step that does not resolve axial vibrations."""
     M, A, dampers, yes = matrices.M.flat, matrices.A.flat, matrices.dampers, w.x.u.size > 0
     stresses = w.stresses
     if state.mixed_steps[0] > 0 and rule.conserving > 0:

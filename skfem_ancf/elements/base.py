@@ -108,10 +108,8 @@ def require_degree(degree: object) -> int:
 
 
 class SectionFunctions:
-    """Polynomials P_k(eta), P_k(0) = 0, by Legendre coefficients (degree, n) of P_k'.
-
-    The section function of a beam is ``h^m P_k(Y / h)`` for an m-th derivative.
-    """
+    """Polynomials P_k(eta), P_k(0) = 0, by Legendre coefficients (degree, n) of P_k'. The section
+    function of a beam is ``h^m P_k(Y / h)`` for an m-th derivative."""
 
     def __init__(self, derivatives: ArrayLike) -> None:
         dP = require_finite("derivatives", derivatives, (None, None))

@@ -75,12 +75,9 @@ def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
 
 
 class Condensed:
-    """Factors of ``[K + sum l H, J^T; J, 0]`` of a frame, J and H the joints' derivatives.
-
-    K is the matrix of the beams, which is assembled before :meth:`factorize`. ``size`` is the
-    number of unknowns of the nodes; ``at`` are the displacement (N,) and multipliers (m,) of the
-    factors.
-    """
+    """Factors of ``[K + sum l H, J^T; J, 0]`` of a frame, J and H the joints' derivatives. K is the
+    matrix of the beams, which is assembled before :meth:`factorize`. ``size`` is the number of
+    unknowns of the nodes; ``at`` are the displacement (N,) and multipliers (m,) of the factors."""
 
     def __init__(self, system: Any, K: BandMatrix) -> None:
         nodes: Nodes = system.constraints.frame
@@ -219,12 +216,9 @@ class Condensed:
 
 
 class CondensedMass:
-    """Solves with the mass matrix of a frame and its joints at any displacement.
-
-    The factors of an earlier displacement are used with iterative refinement, and replaced when it
-    converges too slowly. ``lag`` is the time from the instant of the joint forces to the end of a
-    step.
-    """
+    """Solves with the mass matrix of a frame and its joints at any displacement. The factors of an
+    earlier displacement are used with iterative refinement, and replaced when it converges too
+    slowly. ``lag`` is the time from the instant of the joint forces to the end of a step."""
 
     def __init__(self, system: Any) -> None:
         self._M = system.mass if system.mass.symmetric else system.mass.symmetric_part()
@@ -240,19 +234,16 @@ class CondensedMass:
 
     def forget(self, factors: bool = True) -> None:
         """Discard the last solution and, by default, the factors, so that results do not depend on
-        them.
-        """
+        them."""
         self._last = None
         if factors:
             self.at = None
 
     def solve(self, u: Array, t: float, b: Array, rate: Array, forces: Any = None,
               scale: float = 0.0, most: int = REFINEMENTS) -> tuple[Array, Array]:
-        """Solve ``M x + J^T l = b``, ``J1 x = rate`` for x (N,) and l (m,).
-
-        J1 is the joint Jacobian at u (N,) and t; J is ``forces``, sparse (m, N), or J1. ``scale``
-        is a norm of x to which the accuracy is relative, ``most`` the number of refinements.
-        """
+        """Solve ``M x + J^T l = b``, ``J1 x = rate`` for x (N,) and l (m,). J1 is the joint
+        Jacobian at u (N,) and t; J is ``forces``, sparse (m, N), or J1. ``scale`` is a norm of x to
+        which the accuracy is relative, ``most`` the number of refinements."""
         J1 = self._condensed.nodes.derivative(u, t)
         J = (J1 if forces is None else forces).T
         # another iterate at this instant starts from the last solution
@@ -342,10 +333,8 @@ class _Moves:
         return (np.conj(turns[self._turned]) * turns[self._leading]).real
 
     def __call__(self, turns: Array, scales: Array) -> sparse.csr_array:
-        """Matrix from residuals (m,) to end displacements (3 ends,).
-
-        Its transpose maps negative end forces to multipliers.
-        """
+        """Matrix from residuals (m,) to end displacements (3 ends,). Its transpose maps negative
+        end forces to multipliers."""
         values = np.ones(len(self._at[0]))
         values[:self._following] = -1.0
         values[self._following - len(scales):self._following] /= scales
@@ -354,11 +343,9 @@ class _Moves:
 
 
 class _Basis:
-    """Basis of the DOFs of the ends ``ends`` (M,) of a group's members on one side.
-
-    Its vectors are displacements along x and y, the rotation of the section, stretches of the
-    section's direction along itself, and the rest.
-    """
+    """Basis of the DOFs of the ends ``ends`` (M,) of a group's members on one side. Its vectors are
+    displacements along x and y, the rotation of the section, stretches of the section's direction
+    along itself, and the rest."""
 
     def __init__(self, nodes: Nodes, group: Group, ends: Array) -> None:
         at = nodes.directions[0, ends] - nodes.positions[ends, :1]

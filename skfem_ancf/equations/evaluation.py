@@ -37,11 +37,9 @@ def viscous_force(e, u, v, f):
 
 @apart("statics", Equations, F1, F1, float, float, float, bool, F1, F1, F1)
 def tangent(e, u, factors, t, scale, at, use_independent, stresses, independent, f):
-    """Set internal force, stresses, and the tangent of the residual, in ``e.K``.
-
-    The geometric part uses the independent stresses if ``use_independent``. ``factors``, ``t`` and
-    ``scale`` are as for :func:`~skfem_ancf.actions.tables.external_force`.
-    """
+    """Set internal force, stresses, and the tangent of the residual, in ``e.K``. The geometric part
+    uses the independent stresses if ``use_independent``. ``factors``, ``t`` and ``scale`` are as
+    for :func:`~skfem_ancf.actions.tables.external_force`."""
     body_tangent(e.body, u, f, independent, use_independent, stresses, e.K)
     add_elastic_force(e.forces, at, 0.0, u, u, f)
     add_load_stiffness(e.loads, factors, t, scale, u, e.K)

@@ -40,10 +40,8 @@ class Last:
 
 
 class LinearSolver:
-    """Factorises the tangent of a system with its supports and joints, and solves with it.
-
-    The joints are linearised at a displacement u (N,), a time t and multipliers (m,).
-    """
+    """Factorises the tangent of a system with its supports and joints, and solves with it. The
+    joints are linearised at a displacement u (N,), a time t and multipliers (m,)."""
 
     def __init__(self, system: Any) -> None:
         self._system, self.handle = proxy(system), handle_of(self)
@@ -362,10 +360,8 @@ class Pattern:
 
 
 class NullSpace:
-    """Sparse factors of ``[K, J^T; J, 0]``.
-
-    ``entries`` are those of K outside of the band K; ``pattern`` is the last one of the system.
-    """
+    """Sparse factors of ``[K, J^T; J, 0]``. ``entries`` are those of K outside of the band K;
+    ``pattern`` is the last one of the system."""
 
     def __init__(self, K: BandMatrix, J: Any, entries: Any, constraints: Any,
                  pattern: Pattern) -> None:

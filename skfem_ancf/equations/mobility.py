@@ -82,11 +82,8 @@ def repeated(constraints: Any) -> tuple[Array | None, bool]:
 
 
 def shared(J: sparse.csr_array, multipliers: Array, left: Array, inner: Array) -> Array:
-    """The smallest multipliers (m,) with the same forces as given ones.
-
-    Multipliers of internal equations (``inner``, bool (m,)) are not minimised; ``left`` are the
-    redundant equations.
-    """
+    """The smallest multipliers (m,) with the same forces as given ones. Multipliers of internal
+    equations (``inner``, bool (m,)) are not minimised; ``left`` are the redundant equations."""
     out = multipliers.copy()
     for rows, columns, A in groups(J):
         if np.isin(rows, left).any() and A.size:
@@ -164,10 +161,8 @@ def who(members: Any, k: int) -> str:
 def free_rigid_motions(constraints: Any, joints: Any,
                        stiffness: Callable[[], Any] | None) -> list[str]:
     """Descriptions of the rigid motions that no support, joint or force element constrains.
-
     ``joints`` is the Jacobian (m, N) in the reference configuration; ``stiffness`` returns the
-    sparse stiffness of force elements there, or is None.
-    """
+    sparse stiffness of force elements there, or is None."""
     c = constraints
     motions, of_joints, bodies = _motions(c, joints)
     parts = [motions[c.fixed], of_joints]
@@ -184,10 +179,8 @@ def free_rigid_motions(constraints: Any, joints: Any,
 
 def _motions(c, joints):
     """Rigid motions of the bodies (N, 3 n), J times them, and a function that names the bodies.
-
     Bodies are beams, rigid bodies and, in a frame, rigidly connected parts. Each has two
-    translations and a rotation in units of its size. Small matrices are dense.
-    """
+    translations and a rotation in units of its size. Small matrices are dense."""
     if c.frame is not None:
         frame, origin = c.frame, c.members[0].origin
         parts = frame.parts()

@@ -38,10 +38,8 @@ logger = logging.getLogger(__name__)
 
 
 class StrainTangent:
-    """The tangent ``B^T C B + S`` of a scene; S is the part of stresses, loads and joints.
-
-    The state is a displacement u (N,), a load factor, a time (or None) and multipliers (m,).
-    """
+    """The tangent ``B^T C B + S`` of a scene; S is the part of stresses, loads and joints. The
+    state is a displacement u (N,), a load factor, a time (or None) and multipliers (m,)."""
 
     def __init__(self, system: Any, u: Array, load: float, t: float | None,
                  multipliers: Array) -> None:
@@ -303,10 +301,8 @@ class Inverse:
 
     def solve_both(self, b: Array, c: Array | None = None,
                    accepted: float = ACCEPTED) -> tuple[Array, Array]:
-        """x (n, k) and l (m, k) for columns b and ``J x = c``, 0 by default.
-
-        ``accepted`` is the largest accepted correction relative to x, in the energy norm.
-        """
+        """x (n, k) and l (m, k) for columns b and ``J x = c``, 0 by default. ``accepted`` is the
+        largest accepted correction relative to x, in the energy norm."""
         c = np.zeros((self._tangent.size[1], b.shape[1])) if c is None else c
         x, l, good = self._refined(b, c, accepted)
         if not good and not self._by_strains:

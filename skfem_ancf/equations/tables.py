@@ -54,11 +54,8 @@ class Equations(NamedTuple):
 
 
 class UserDefined:
-    """The items of a system without tables.
-
-    Times are nan in statics; results are added to ``out`` (N,). Force elements are called through
-    ``forces``.
-    """
+    """The items of a system without tables. Times are nan in statics; results are added to ``out``
+    (N,). Force elements are called through ``forces``."""
 
     def __init__(self, system: Any, loads: Sequence[Load]) -> None:
         self._system = proxy(system)
@@ -79,10 +76,8 @@ class UserDefined:
             out[s] += factor * force
 
     def subtract_custom_stiffness(self, t: float, scale: float, u: Array, flat: Array) -> None:
-        """Subtract the derivative of :meth:`add_custom_force` from the entries (n,) of a band.
-
-        An infinite time stands for linear theory, in which the package's loads have no stiffness.
-        """
+        """Subtract the derivative of :meth:`add_custom_force` from the entries (n,) of a band. An
+        infinite time stands for linear theory, in which the package's loads have no stiffness."""
         system = self._system
         for load in self._loads:
             if np.isinf(t) and not load.first_order:
@@ -123,11 +118,9 @@ class UserDefined:
 
 
 class Tables:
-    """The tables of a system, and their time-dependent parts.
-
-    ``plain`` are the Equations for NumPy; ``motion_varies`` is True if a joint moves with time,
-    ``turns`` if its Jacobian in the reference configuration does.
-    """
+    """The tables of a system, and their time-dependent parts. ``plain`` are the Equations for
+    NumPy; ``motion_varies`` is True if a joint moves with time, ``turns`` if its Jacobian in the
+    reference configuration does."""
 
     def __init__(self, system: Any) -> None:
         # a weak reference, since the system refers to the tables
@@ -337,10 +330,8 @@ class Tables:
         return any(load.prestress for load in [*self._loads[2], *self._loads[3]])
 
     def static_factors(self, scale: float, before: float | None = None) -> Array:
-        """Load factors (k,) in statics at the load factor ``scale``.
-
-        ``before`` is the load factor of the initial state, for prestress in the first tangent.
-        """
+        """Load factors (k,) in statics at the load factor ``scale``. ``before`` is the load factor
+        of the initial state, for prestress in the first tangent."""
         out = scale * self._at_rest
         if before is None or not self.prestressed:
             return out
@@ -411,10 +402,8 @@ class Tables:
 
     @cached_property
     def still(self) -> tuple[Array, Array]:
-        """Constant c and g with two rates, (1, 3, m) and (1, 4, k); zero where time-dependent.
-
-        g occurs twice: at the end of a step and where the joints act.
-        """
+        """Constant c and g with two rates, (1, 3, m) and (1, 4, k); zero where time-dependent. g
+        occurs twice: at the end of a step and where the joints act."""
         s, joints, first = self.system, self.plain.joints, np.zeros(1)
         c, g = np.zeros((1, 3, s.constraints.m)), np.zeros((1, 4, len(joints.gk)))
         if s.constraints.m and not joints.custom:

@@ -349,11 +349,9 @@ def _require_derivatives(law, material):
 
 
 class OverriddenLaw:
-    """The law of a subclass that overrides ``stress`` alone.
-
-    Its energy is ``int_0^1 strain . stress(x strain) dx`` by eight Gauss points. Its moduli are the
-    complex step of the stress, unless the subclass overrides ``moduli``.
-    """
+    """The law of a subclass that overrides ``stress`` alone. Its energy is ``int_0^1 strain .
+    stress(x strain) dx`` by eight Gauss points. Its moduli are the complex step of the stress,
+    unless the subclass overrides ``moduli``."""
 
     def __init__(self, material: Material) -> None:
         self.base, self.stress = material, material.stress

@@ -28,9 +28,7 @@ NO_VARIABLES: Mapping[str, int] = {}
 
 class AtRest(LinearLaw):
     """The moduli of a material with a history at zero strain, for what knows no history.
-
-    ``material`` is the material, ``scale`` (3,) the factors of strain and stress for shear.
-    """
+    ``material`` is the material, ``scale`` (3,) the factors of strain and stress for shear."""
 
     def __init__(self, material: HistoryMaterial, k_s: float) -> None:
         self.material, self.scale = material, np.array([1.0, 1.0, np.sqrt(k_s)])

@@ -30,8 +30,7 @@ UNITS = "m", "mm", "cm", "dm", "km", "in", "ft", "yd"
 
 def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
     """The lines and points of a drawing as a meshio mesh, cell sets named after their layers; None
-    takes coordinates as drawn.
-    """
+    takes coordinates as drawn."""
     import meshio
 
     try:
@@ -91,8 +90,7 @@ LINE = re.compile("line([0-9]*)")
 def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
                     tol: float | None = None, unit: str | None = None) -> FrameGraph:
     """The graph of the line cells of a ``meshio.Mesh``, or of a file of meshio or DXF: see
-    :meth:`skfem_ancf.Frame.from_meshio`. ``named`` are sets to which other arguments refer.
-    """
+    :meth:`skfem_ancf.Frame.from_meshio`. ``named`` are sets to which other arguments refer."""
     mesh = _mesh_of(mesh, unit)
     if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
         raise InputError(f"groups are names of sets of lines, got {shown(groups)}")

@@ -273,8 +273,7 @@ class FrameGraph:
 
     def nodes_at(self, place: Any) -> Array:
         """Numbers of the nodes at one of :data:`PLACES`, an array of numbers or of points, shape
-        (k,), k >= 1.
-        """
+        (k,), k >= 1."""
         found = self.same[self.points_at(place)]
         return found if len(found) == 1 else np.unique(found)
 
@@ -326,8 +325,7 @@ class FrameGraph:
 
     def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
         """A mesh with one chain for each of the lines (k,); ``elements`` (m,) are the numbers for
-        every line.
-        """
+        every line."""
         n = elements[lines]
         first = np.concatenate([[0], np.cumsum(n + 1)])
         line = np.repeat(np.arange(len(lines)), n + 1)

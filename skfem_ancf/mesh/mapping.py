@@ -278,8 +278,7 @@ class MappingBeam(Mapping):
 
     def invF(self, x: Array, tind: Array | None = None) -> Array:
         """Reference points of points x, also outside the cell, (2, nelements, npoints) both; or
-        NaN.
-        """
+        NaN."""
         return self.inverse(x, slice(None) if tind is None else tind)
 
     # facets

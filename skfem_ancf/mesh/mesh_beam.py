@@ -766,8 +766,7 @@ class MeshBeam(NumberedMesh):
 def reach(meshes: Sequence[MeshBeam]) -> float:
     """The size of a scene, to which tolerances of positions are relative: the diagonal of the
     bounding box of all nodes, but at least the longest line (a curled line may be straightened) and
-    at most the total length of all lines.
-    """
+    at most the total length of all lines."""
     if len(meshes) == 1 and meshes[0].is_chain:
         return float(meshes[0].lengths.sum())
     total = float(sum(mesh.lengths.sum() for mesh in meshes))

@@ -37,8 +37,7 @@ def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
 
 class Inverse:
     """The map from the body to the reference cell, from the Hermite coefficients of axis (relative
-    to ``start``) and director (times the largest height), and powers of the relative height.
-    """
+    to ``start``) and director (times the largest height), and powers of the relative height."""
 
     def __init__(self, start: Array, axis: Array, director: Array, height: float,
                  heights: Array | None) -> None:
@@ -61,8 +60,7 @@ class Inverse:
 
     def __call__(self, x: Array, e: Any) -> Array:
         """Reference points of points of elements e, both (2, n, npoints), by Newton's method; or
-        NaN.
-        """
+        NaN."""
         axis, director, crossed = (
             c[..., e, None] for c in (self.axis, self.director, self.crossed))
         gap = x - self.start[:, e, None]
@@ -121,8 +119,7 @@ class Finder:
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
         """Elements (n,), reference points (2, n), relative distances outside of them (zero, or
         infinite far away) for points (2, n) of a ``chain`` or of all, and whether chains are
-        equally near.
-        """
+        equally near."""
         n = x.shape[1]
         noise = 1e-9 + 8 * EPS * (
             self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
@@ -269,8 +266,7 @@ KINDS = ("the name of a boundary, a material point (x, y), a function of the poi
 
 def is_point(place: object) -> bool:
     """True for two numbers in a tuple, a list or an array of floats; integers of an array are
-    facets.
-    """
+    facets."""
     if isinstance(place, np.ndarray):
         return place.shape == (2,) and place.dtype.kind == "f"
     return (isinstance(place, (tuple, list)) and len(place) == 2

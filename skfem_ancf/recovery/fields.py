@@ -553,8 +553,7 @@ def find_fields(fields: Any, beams: Sequence[Any] = ()) -> list[Field]:
 
 class DomainValues(Values):
     """Fields at points x of a domain, with displacements u (2, n) and their gradient (2, 2, n), or
-    :func:`~skfem_ancf.core.linear.step` of them; components are in global axes.
-    """
+    :func:`~skfem_ancf.core.linear.step` of them; components are in global axes."""
 
     def __init__(self, domain: Domain, x: Array, u: Array, gradient: Array) -> None:
         self.beam: Any = domain
@@ -601,8 +600,7 @@ class DomainValues(Values):
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
     """Values at points (xi, eta) of all elements, (2, npoints) or (2, nelements, npoints),
-    flattened.
-    """
+    flattened."""
     ne = beam.mesh.nelements
     part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
                       np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1))

@@ -136,10 +136,8 @@ def _back(rows: Array, like: Any) -> Array:
 
 class Segment:
     """The fields between two cuts, at n sections (ends and middles of elements) of m points.
-
     ``strain`` and ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the axial fibres.
-    Of several instants together, the fields have an axis of the instants before n.
-    """
+    Of several instants together, the fields have an axis of the instants before n."""
 
     def __init__(self, recovery: Any, start: float, end: float) -> None:
         self.recovery, self.forces = recovery, recovery.forces
@@ -251,8 +249,7 @@ class Segment:
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """Integral from the axis of the axial derivative at constant distance from it, for values
-        (..., n, m) at constant relative positions.
-        """
+        (..., n, m) at constant relative positions."""
         lean = self.lean * values
         return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]
 
@@ -272,8 +269,7 @@ class Segment:
 
     def _section(self):
         """Set strain, r_X, r_Y and the stress P on sections, along t and n, from S_yy, S_xy and
-        stretch.
-        """
+        stretch."""
         r = self.recovery
         if self.stress_given:
             eps = self.E0 + r.strain_of(self.S / self.grade, self.eps - self.E0)
@@ -451,8 +447,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array,
                      unknown: tuple[int, ...] = (0, 1, 2),
                      tol: float = 1e-10) -> Array:
     """The strain (3, ...) with a given stress under a law, by Newton's method for the ``unknown``
-    components.
-    """
+    components."""
     if isinstance(law, LinearLaw):
         gap, some = stress - law.stress(strain), slice(unknown[0], unknown[-1] + 1)
         strain, C = strain.astype(gap.dtype), law.compliance(unknown)
@@ -484,8 +479,7 @@ def _axial(law, strain):
 
 class Recovery:
     """The recovered fields of one beam, a :class:`Segment` between cuts; ``why`` they are not
-    there.
-    """
+    there."""
 
     def __init__(self, forces: Any, u: Any) -> None:
         self.forces, self.beam, self._u = forces, forces.beam, u
@@ -594,8 +588,7 @@ class Recovery:
 
     def segment_of(self, e: Array, xi: Array, after: Any = False) -> Array:
         """Segment numbers of sections, (n,); those at a cut inside an element are before it, or
-        ``after``.
-        """
+        ``after``."""
         cuts = self.forces.cuts
         at_node = np.minimum(xi, 1.0 - xi) < SNAP
         place = e + np.where(at_node, np.round(xi), xi)

@@ -79,8 +79,7 @@ class ArcLength:
 class Interval(NamedTuple):
     """Part of a section, ``low`` to ``high`` (eta), with fields polynomial in s in [0, 1]. If
     ``curved``, ``eta = middle - half cos(pi s)``, which smooths square roots of the width at the
-    ends.
-    """
+    ends."""
 
     low: float
     high: float
@@ -123,8 +122,7 @@ class AcrossPoints(NamedTuple):
 
 class Intervals:
     """Points ``eta`` (m,) across a section of layers, the highest one, with weights of integrals
-    and values; ``layers`` are columns, ``width`` (m,) is relative.
-    """
+    and values; ``layers`` are columns, ``width`` (m,) is relative."""
 
     def __init__(self, layers: Sequence[Layer], order: int) -> None:
         self._measures = [layer.measure for layer in layers]
@@ -211,10 +209,8 @@ class Intervals:
 
 class Sections:
     """Points ``eta`` across sections at ``xi`` (n,) of elements ``e`` (n,), with shape functions.
-
     With ``lifted``, points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as in
-    :class:`~skfem_ancf.beam.masses.Masses`; otherwise all are on the axis.
-    """
+    :class:`~skfem_ancf.beam.masses.Masses`; otherwise all are on the axis."""
 
     def __init__(self, beam: Beam, e: Array, xi: Array, eta: Any = 0.5,
                  lifted: bool = False, mapping: MappingBeam | None = None) -> None:
@@ -422,8 +418,7 @@ class SectionForces:
 
     def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
         """Force (2, n) and moment (n,) about the axis, of the right part on the left, for segments
-        that begin at the cuts ``begin`` (n,).
-        """
+        that begin at the cuts ``begin`` (n,)."""
         # the mean of equilibrium from both ends of the element; next to an unknown force inside it,
         # only the end on this side
         side = np.full(len(e), 0.5)

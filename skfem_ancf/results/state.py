@@ -438,8 +438,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     @cached_property
     def _places(self) -> Array:
         """Displacement at which fields are evaluated, (N,); for a linear solution a step from its
-        base.
-        """
+        base."""
         return self.u if self.base is None else step(self.base.u, self.u)
 
     def _places_of(self, beam):

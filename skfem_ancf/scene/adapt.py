@@ -42,12 +42,9 @@ MOST_ELEMENTS, MAX_ELEMENTS = 20000, 10**7
 
 @dataclass(frozen=True)
 class Refinement:
-    """One round of an adaptive solution for one beam.
-
-    ``beam`` is its number; ``kind`` is "degree" if the degree along the axis was raised, "split" if
-    elements were halved; ``degree`` and ``elements`` are the new ones, ``error`` the estimate
-    before.
-    """
+    """One round of an adaptive solution for one beam. ``beam`` is its number; ``kind`` is "degree"
+    if the degree along the axis was raised, "split" if elements were halved; ``degree`` and
+    ``elements`` are the new ones, ``error`` the estimate before."""
 
     beam: int
     kind: str
@@ -291,12 +288,9 @@ def _prolonged(beam, halving, u):
 
 
 def _mark(coarse, state, fine, better, split):
-    """Elements of the coarse mesh with most of the difference in the energy norm.
-
-    Only beams that are ``split``, whose elements the fine mesh has halved, have any. Where the
-    loads of both meshes differ, as those that jump within an element, the work of their difference
-    is included.
-    """
+    """Elements of the coarse mesh with most of the difference in the energy norm. Only beams that
+    are ``split``, whose elements the fine mesh has halved, have any. Where the loads of both meshes
+    differ, as those that jump within an element, the work of their difference is included."""
     before, after = coarse.system.external_force(state.u), fine.system.external_force(better.u)
     errors = []
     for a, b, s in zip(coarse.beams, fine.beams, split):

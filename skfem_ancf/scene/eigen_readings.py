@@ -267,10 +267,8 @@ def _require_symmetry(work):
 
 
 class _Quadratic:
-    """``x . (K - mu M) x + 2 y . J x`` in a state, as a sum of rows (N + m,).
-
-    x is a shape (N,) with multipliers y (m,), in ``vector``.
-    """
+    """``x . (K - mu M) x + 2 y . J x`` in a state, as a sum of rows (N + m,). x is a shape (N,)
+    with multipliers y (m,), in ``vector``."""
 
     def __init__(self, system: Any, state: State, x: Array, mu: float,
                  vector: Array | None = None) -> None:

@@ -154,8 +154,7 @@ class LinearModel:
 
     def _quasi_static(self, T):
         """Static displacements of unit prescribed motions, (N, k), and the forces T^T A U of mass,
-        damping and stiffness.
-        """
+        damping and stiffness."""
         U = np.zeros_like(self.B)
         if np.any(self.G) or np.any(self.prescribed):
             shift = SHIFT * self._system.scales.bending_eigenvalue
@@ -234,11 +233,8 @@ class LinearModel:
 
 
 class Bordered:
-    """Solutions with sums of matrices such as K, D and M, with joints and supports.
-
-    The sums have one sparsity pattern. ``prescribed`` are displacements of fixed degrees of
-    freedom, (N, k).
-    """
+    """Solutions with sums of matrices such as K, D and M, with joints and supports. The sums have
+    one sparsity pattern. ``prescribed`` are displacements of fixed degrees of freedom, (N, k)."""
 
     def __init__(self, matrices: Sequence[Any], J: Any, constraints: Any,
                  prescribed: Array) -> None:
@@ -275,10 +271,8 @@ class Bordered:
         return u, x[n:]
 
     def adjoint(self, factors: Sequence[float], by: Array) -> Array:
-        """The adjoint (N + m, r) of readings with derivatives ``by`` (N + m, r).
-
-        At fixed degrees of freedom the equation is that of the prescribed displacement.
-        """
+        """The adjoint (N + m, r) of readings with derivatives ``by`` (N + m, r). At fixed degrees
+        of freedom the equation is that of the prescribed displacement."""
         (sizes, lu), N = self._factors(factors), len(self._free)
         out, free = by.copy(), np.append(self._free, np.ones(len(by) - N, bool))
         found = np.zeros_like(by)

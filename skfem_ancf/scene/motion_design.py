@@ -400,10 +400,8 @@ class _Step:
         return found
 
     def backward(self, bars: dict[str, Array], pull: Array) -> tuple[Array, dict[str, Array]]:
-        """The adjoint of the equations, and derivatives by the instant before.
-
-        ``bars`` are the derivatives by this instant, ``pull`` (m,) those by the multipliers.
-        """
+        """The adjoint of the equations, and derivatives by the instant before. ``bars`` are the
+        derivatives by this instant, ``pull`` (m,) those by the multipliers."""
         c, M = self._system.constraints, self._system.mass.multiply
         start = self._before is None
         u, v, a, w = (bars[name] for name in NAMES)
@@ -419,11 +417,8 @@ class _Step:
 
 class _MeanStep(_Step):
     """A step of :class:`~skfem_ancf.EnergyMomentum`, with mean forces; as _Step, but for u, l; v,
-    impulses.
-
-    Accelerations and multipliers at the end are extrapolated from those in the middle of this step
-    and the one before, w and "force".
-    """
+    impulses. Accelerations and multipliers at the end are extrapolated from those in the middle of
+    this step and the one before, w and "force"."""
 
     def __init__(self, design: MotionDesign, y: Motion, before: Motion) -> None:
         system = self._system = design._built.system
@@ -534,9 +529,7 @@ class _Factors(NamedTuple):
 
 def _factors(rows, K, c, h):
     """The factors of equations and unknowns in blocks u, l; v, impulses; a, forces, or the first.
-
-    They are scaled by the sizes of coordinates, a stiffness K and the time h.
-    """
+    They are scaled by the sizes of coordinates, a stiffness K and the time h."""
     sizes, one = c.coordinate_sizes, np.ones(c.m)
     scale = float(np.abs(K.diagonal() * sizes**2)[c.free].max())
     n = 2 * len(rows) // (2 if c.m else 1)
@@ -560,9 +553,7 @@ def _turning(design, y):
 
 def _by_columns(design, force, u, t, mean):
     """The derivative of a force, a mean one or of damping, by the displacement at u, sparse (N, N).
-
-    By differences; columns without common rows are moved at once, see [2] of Design.
-    """
+    By differences; columns without common rows are moved at once, see [2] of Design."""
     system = design._built.system
     if mean not in design._coloured:
         design._coloured[mean] = _colours(system, u, t, mean)
@@ -584,11 +575,9 @@ def _by_columns(design, force, u, t, mean):
 
 
 def _colours(system, u, t, mean):
-    """Rows and columns (k,) of the derivative of a force, colours (N,) of columns, and a step.
-
-    Mean forces of loads with an energy of their own couple all DOFs of a beam, those of torques
-    both ends; they are no polynomials, nor are those of nonlinear laws.
-    """
+    """Rows and columns (k,) of the derivative of a force, colours (N,) of columns, and a step. Mean
+    forces of loads with an energy of their own couple all DOFs of a beam, those of torques both
+    ends; they are no polynomials, nor are those of nonlinear laws."""
     n, elements, own, pairs = len(system.beams), system.forces.elements, [], []
     pattern = [entries_of(s.start + element_dofs(beam)) for beam, s in zip(
         system.beams, system.slices) if mean or system.viscous]

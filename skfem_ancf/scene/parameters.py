@@ -30,11 +30,9 @@ OF_LAYERS = {"thickness": 0, "width": 2}
 
 
 class Parameter(NamedTuple):
-    """One parameter, which may be an array: ``name`` of ``owner``, or a field of a beam.
-
-    ``name`` is a path of attributes, or several; ``field`` one of FIELDS, "axis", "time" for a
-    function of time, a function for coefficients, or empty; ``sizes`` are typical.
-    """
+    """One parameter, which may be an array: ``name`` of ``owner``, or a field of a beam. ``name``
+    is a path of attributes, or several; ``field`` one of FIELDS, "axis", "time" for a function of
+    time, a function for coefficients, or empty; ``sizes`` are typical."""
 
     owner: Any
     name: Any

@@ -20,10 +20,8 @@ from ..results.state import State
 
 
 class Held(Amplitude):
-    """A function of time whose value is set before each step.
-
-    Sizes of loads are constant in a step, ``ramped`` motions go straight from one value to another.
-    """
+    """A function of time whose value is set before each step. Sizes of loads are constant in a
+    step, ``ramped`` motions go straight from one value to another."""
 
     def __init__(self, first: Any, ramped: bool) -> None:
         self.first, self.ramped = np.asarray(first, dtype=float), ramped

@@ -51,8 +51,7 @@ def off_ends(X: Array) -> Array:
 def jumps(ask: Callable[[Array, Array], Array], n: int, eta: Array, size: float | None = None
           ) -> Array:
     """Elements at whose start a function ``ask(X, e)`` of reference points (2, n, k) jumps, by more
-    than ``size`` or 1e-3 of its largest value.
-    """
+    than ``size`` or 1e-3 of its largest value."""
     e = np.arange(n)
     left, right = (ask(np.array([np.full((n, len(eta)), xi), np.tile(eta, (n, 1))]), e)
                    for xi in (SIDE, 1.0 - SIDE))

@@ -35,8 +35,7 @@ MEAN = 8
 
 class Piece(NamedTuple):
     """An interval with smooth width, a number or a function of eta (n,); at its ends maybe a square
-    root.
-    """
+    root."""
 
     low: float
     high: float
@@ -609,12 +608,9 @@ def _layer(given, k, h):
 
 
 class Numbers(Section):
-    """A section given by stiffnesses, see :meth:`Section.numbers`.
-
-    Two Gauss points at a distance of sqrt(EI / EA) from the axis have its stiffnesses. Masses at
-    sqrt(rhoI / rhoA) have its inertias. The height of the mesh serves section coordinates and plots
-    only.
-    """
+    """A section given by stiffnesses, see :meth:`Section.numbers`. Two Gauss points at a distance
+    of sqrt(EI / EA) from the axis have its stiffnesses. Masses at sqrt(rhoI / rhoA) have its
+    inertias. The height of the mesh serves section coordinates and plots only."""
 
     has_materials = True
     has_fields = False

@@ -86,11 +86,9 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
 
 
 def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -> Array:
-    """The required firmness, shape (groups,); at least the present one.
-
-    ``energy`` is the strain energy including that of the penetration, ``yields`` the result of
-    :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`.
-    """
+    """The required firmness, shape (groups,); at least the present one. ``energy`` is the strain
+    energy including that of the penetration, ``yields`` the result of
+    :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`."""
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
@@ -172,10 +170,8 @@ class StiffnessRamp:
         self.solve, self.energy, self.failed = solve, energy, failed
 
     def climb(self, found: Any, rough: bool) -> Any:
-        """The equilibrium on stiff obstacles, or the last one before a failure.
-
-        ``rough``: ``found`` is one that is only a start.
-        """
+        """The equilibrium on stiff obstacles, or the last one before a failure. ``rough``:
+        ``found`` is one that is only a start."""
         contacts = self.contacts
         for _ in range(0 if contacts.untouched(found[0]) else TIMES):
             u, yields = found[0], np.zeros(len(contacts.groups))

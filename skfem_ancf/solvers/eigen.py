@@ -74,10 +74,8 @@ def rest_modes(system: System, k: int) -> tuple[Array, Array]:
 
 
 def improved(system: System, shapes: Array) -> Array:
-    """Frequencies (k,) at rest near those of approximate shapes (k, N), the lowest first.
-
-    By two steps of subspace iteration.
-    """
+    """Frequencies (k,) at rest near those of approximate shapes (k, N), the lowest first. By two
+    steps of subspace iteration."""
     state = State(system, np.zeros(system.N), load=0.0)
     tangent = StrainTangent(system, state.u, 0.0, None, state.multipliers)
     M, X = _free_mass(system, tangent), shapes[:, tangent.free].T
@@ -168,10 +166,8 @@ def _dense(tangent, M, k, shift):
 
 
 def _sparse(tangent, state, M, k, shift):
-    """The k lowest modes by Lanczos on the inverse, and one step of subspace iteration.
-
-    Lanczos may miss some of equal frequencies: they are counted, and the missing ones computed.
-    """
+    """The k lowest modes by Lanczos on the inverse, and one step of subspace iteration. Lanczos may
+    miss some of equal frequencies: they are counted, and the missing ones computed."""
     inverse, rng = Inverse(tangent, M, shift), np.random.default_rng(0)
     start = inverse.solve(rng.standard_normal(M.shape[0]))
     apply = inverse.once if inverse.left < UNREFINED else inverse.solve
@@ -201,10 +197,8 @@ def _lanczos(M, k, shift, apply, start):
 
 
 def _missing(tangent, state, shift, values):
-    """Number of missing eigenvalues below the largest one found, by Sylvester's law of inertia.
-
-    It is 1 if there are no factors.
-    """
+    """Number of missing eigenvalues below the largest one found, by Sylvester's law of inertia. It
+    is 1 if there are no factors."""
     below = values[-1] - SAME * max(abs(values[-1]), shift)
     try:
         number = _negative(tangent, state, -below)

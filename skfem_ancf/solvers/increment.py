@@ -78,10 +78,8 @@ class Options(NamedTuple):
 
 
 class Increment:
-    """The step from the last equilibrium to a load level; ``record`` counts all iterations.
-
-    Its ``system`` is that after the history of the last equilibrium.
-    """
+    """The step from the last equilibrium to a load level; ``record`` counts all iterations. Its
+    ``system`` is that after the history of the last equilibrium."""
 
     def __init__(self, system: System, start: StaticResult, level: float,
                  options: Options) -> None:
@@ -107,10 +105,8 @@ class Increment:
         return found
 
     def resting(self) -> Equilibrium | None:
-        """The last equilibrium, if only round-off acts there; else None.
-
-        As of a body in a turned scene that just touches an obstacle.
-        """
+        """The last equilibrium, if only round-off acts there; else None. As of a body in a turned
+        scene that just touches an obstacle."""
         system, (u, multipliers) = self.system, (self.start.u, self.start.multipliers)
         tables = system.backend.tables
         target, *_ = self._target(tables, u, multipliers, system.solver)
@@ -182,11 +178,8 @@ class Increment:
 
     def _from_start(self, options):
         """Iterate from the last equilibrium; if that fails, from the equilibrium of the linearised
-        law.
-
-        A correction that turns a beam far strains it temporarily, possibly beyond the range of a
-        nonlinear law. The equilibrium of Hooke's law is close to the final one.
-        """
+        law. A correction that turns a beam far strains it temporarily, possibly beyond the range of
+        a nonlinear law. The equilibrium of Hooke's law is close to the final one."""
         backend = None if self.start.diverging else self.system.backend.linearised
         if backend is None:
             return self.iterate(options=options)

@@ -82,11 +82,9 @@ def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any
 
 @source
 def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
-    """Iterate from x[U] and the multipliers m[0]; ``record`` gets residuals and works.
-
-    Returns the status, the numbers of residuals and of works, and whether the last factors are
-    those of ``e.factors``.
-    """
+    """Iterate from x[U] and the multipliers m[0]; ``record`` gets residuals and works. Returns the
+    status, the numbers of residuals and of works, and whether the last factors are those of
+    ``e.factors``."""
     residuals, works = record[0], record[1]
     u, du, force, load, R, moved = x[U], x[DU], x[FORCE], x[LOAD], x[RESIDUAL], x[MOVED]
     multipliers, phi, dm = m[0], m[1], m[2]

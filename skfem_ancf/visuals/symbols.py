@@ -25,11 +25,9 @@ NOTES = "eigenstrain", "drag"
 
 
 def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> list[Symbol]:
-    """Symbols of the loads, and of all other items, of the scene of a state.
-
-    With ``start`` loads have their full values, as before the solution; those that move or depend
-    on time are those at time 0, or at 1 if they vanish there.
-    """
+    """Symbols of the loads, and of all other items, of the scene of a state. With ``start`` loads
+    have their full values, as before the solution; those that move or depend on time are those at
+    time 0, or at 1 if they vanish there."""
     if not (loads or supports):
         return []
     system: Any = getattr(state, "system", None)
@@ -57,10 +55,8 @@ def unit_of_load(symbol: Symbol, units: tuple[str, str] | None) -> str:
 
 
 class Sketch:
-    """Draws symbols on Axes ``ax``; the gid of each artist is the kind of its symbol.
-
-    ``u`` (N,) is the drawn displacement, ``points`` (n, 2) are drawn points of the bodies.
-    """
+    """Draws symbols on Axes ``ax``; the gid of each artist is the kind of its symbol. ``u`` (N,) is
+    the drawn displacement, ``points`` (n, 2) are drawn points of the bodies."""
 
     def __init__(self, ax: Any, u: Array, points: Array,
                  units: tuple[str, str] | None = None) -> None:

@@ -32,11 +32,8 @@ class MeasuredPoint(NamedTuple):
 
 
 class MeasuredSection(NamedTuple):
-    """Rotation of a section and its rate.
-
-    ``angle`` is measured from the reference configuration in radians, in (-pi, pi],
-    counterclockwise.
-    """
+    """Rotation of a section and its rate. ``angle`` is measured from the reference configuration in
+    radians, in (-pi, pi], counterclockwise."""
 
     angle: float
     rate: float

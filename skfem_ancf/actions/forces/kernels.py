@@ -36,11 +36,8 @@ AT_ONCE = 1e-300
 
 
 class Kinds(NamedTuple):
-    """Elements of the kinds above.
-
-    Their number, the first of each kind, their parameters, and the angles of torsional springs at
-    the end of the last step, with whole turns.
-    """
+    """Elements of the kinds above. Their number, the first of each kind, their parameters, and the
+    angles of torsional springs at the end of the last step, with whole turns."""
 
     number: int
     ends: I1
@@ -161,10 +158,8 @@ def at_rest(tables, u0, u1):
 
 @source
 def add_elastic_force(tables, t, span, u0, u1, f):
-    """Add the mean force at zero velocity with exact work from u0 to u1.
-
-    It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
-    """
+    """Add the mean force at zero velocity with exact work from u0 to u1. It is a mean over a time
+    span about t; the force at t for u0 = u1 and span zero."""
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
     if tables.changing > 0 and not at_rest(tables, u0, u1):
@@ -273,9 +268,7 @@ def settle_contact(tables, t, span, u0, u1, out):
 @source
 def settle_elements(tables, t, u0, u1, v, out):
     """Set the histories of user-defined elements at the end of a step, with the velocity v there.
-
-    What they dissipate is added to out, (1,).
-    """
+    What they dissipate is added to out, (1,)."""
     if tables.custom > 0 and tables.start.size > 0:
         n = tables.start.size
         y, w = np.empty(n), np.empty(2 * n)

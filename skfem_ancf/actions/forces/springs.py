@@ -127,11 +127,9 @@ def number_or_law(name: str, given: Any, of: str) -> Proportional | Law:
 # rotations of rigid bodies and of sections with moments, with full turns
 
 class Turns:
-    """Rotations of sections with moments, then those of rigid bodies.
-
-    A displacement defines them up to full turns. They are tracked over a sequence of displacements
-    with changes of less than half a turn.
-    """
+    """Rotations of sections with moments, then those of rigid bodies. A displacement defines them
+    up to full turns. They are tracked over a sequence of displacements with changes of less than
+    half a turn."""
 
     def __init__(self, system: Any) -> None:
         self._system = system

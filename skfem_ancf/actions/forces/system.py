@@ -345,10 +345,7 @@ class Forces:
     def changing_entries(self, t: float, u0: Array, u1: Array, v: Array | None = None,
                          factor: float = 0.0) -> tuple[Array, Array, Array]:
         """Rows, columns and values (k,) of the stiffness of changing elements, of the mean force
-        between two displacements if these are two arrays.
-
-        Plus a factor times the resistance.
-        """
+        between two displacements if these are two arrays. Plus a factor times the resistance."""
         found = [(NONE, NONE, np.zeros(0))]
         if is_clear(self.clear, u0, 0.0) and is_clear(self.clear, u1, 0.0):
             return found[0]

@@ -118,9 +118,7 @@ def angle_to(d: ArrayLike, e: ArrayLike) -> float:
 
 class Equation:
     """The sum of ``n . v`` over pairs of a vector and a direction, plus ``d . M e``, less a number.
-
-    Vectors v, d and e are affine in the degrees of freedom u (N,) of the scene; M is (2, 2).
-    """
+    Vectors v, d and e are affine in the degrees of freedom u (N,) of the scene; M is (2, 2)."""
 
     def __init__(self, *pairs: tuple[Vector, Any],
                  product: tuple[Vector, Vector, Array] | None = None, less: float = 0.0) -> None:

@@ -27,9 +27,8 @@ COMPONENTS = "x", "y", "angle"
 
 
 class Settlements:
-    """Prescribed displacements of supports along x and y, and rotations in radians: ``numbers``
-    (n, 3) proportional to the load factor, or functions of time ``of`` a node and a component.
-    """
+    """Prescribed displacements of supports along x and y, and rotations in radians: ``numbers`` (n,
+    3) proportional to the load factor, or functions of time ``of`` a node and a component."""
 
     def __init__(self, numbers: Array, of: dict[tuple[int, int], Any] | None = None) -> None:
         self.numbers, self.of = numbers, of or {}
@@ -294,8 +293,7 @@ class Nodes(Joint):
 
     def fixed_motions(self, parts: Array, origin: Array, size: float, number: int) -> Any:
         """Constraints of nodes and supports on rigid motions of groups; dense for one group, else
-        sparse.
-        """
+        sparse."""
         part = np.repeat(parts, 2)
         x, y = (self.graph.points[:, self.nodes] - origin[:, None]) / size
         one = np.ones(len(x))

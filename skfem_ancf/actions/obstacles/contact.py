@@ -208,11 +208,9 @@ def _balanced(group, pressure):
 
 
 def _corners(group, touching):
-    """Points at corners, and a point each of the face there that touches more; (2, k).
-
-    A corner is a point of bottom or top and points of an end. A face that touches only there faces
-    away from the obstacle: its force is on the other one.
-    """
+    """Points at corners, and a point each of the face there that touches more; (2, k). A corner is
+    a point of bottom or top and points of an end. A face that touches only there faces away from
+    the obstacle: its force is on the other one."""
     m, last = group.points, (group.elements - 2) * group.points
     places, pairs = np.vstack([group.starts[:2], group.offsets]), []
     for end, element, first in ((last, 0, 0), (last + m, last - m, -1)):

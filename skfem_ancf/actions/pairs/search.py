@@ -35,10 +35,8 @@ OPPOSED = -0.2
 
 
 class Candidates(NamedTuple):
-    """Pairs of points and facets, a guess of zeta, and where all points were at the search.
-
-    It is complete until points or facets have moved by half of ``skin``.
-    """
+    """Pairs of points and facets, a guess of zeta, and where all points were at the search. It is
+    complete until points or facets have moved by half of ``skin``."""
 
     p: Array
     e: Array
@@ -49,10 +47,8 @@ class Candidates(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Pairs of points and facets in contact, (n,) each: their closest points and gaps.
-
-    ``clear`` is the least gap of all if there are none.
-    """
+    """Pairs of points and facets in contact, (n,) each: their closest points and gaps. ``clear`` is
+    the least gap of all if there are none."""
 
     p: Array
     e: Array
@@ -115,10 +111,8 @@ class Search:
                           skin)
 
     def touching(self, z: Array) -> Touching:
-        """The pairs with a gap below the one at which the pressure begins.
-
-        The last ones are kept: forces and stiffnesses ask for the same states in turn.
-        """
+        """The pairs with a gap below the one at which the pressure begins. The last ones are kept:
+        forces and stiffnesses ask for the same states in turn."""
         for at, found in self._last:
             if np.array_equal(at, z):
                 return found
@@ -167,10 +161,8 @@ class Search:
     # parts that are one body
 
     def _together(self, p, e, zeta, less):
-        """True for points and facets of one beam, or of joined ones, near to each other.
-
-        Closer by ``less`` (F,).
-        """
+        """True for points and facets of one beam, or of joined ones, near to each other. Closer by
+        ``less`` (F,)."""
         f = self.surfaces.facets
         own, a = f.of[p], self._along(f.of[p], f.zeta[p])
         b, apart = self._along(e, zeta), APART * f.heights[e] - less[e]
@@ -200,10 +192,8 @@ class Search:
                 0.5 * (s[:, :-1] + s[:, 1:]).ravel(), f.members[e])
 
     def _joined(self, solids):
-        """Chains and places on them, two each, where axes meet in the reference configuration.
-
-        Or where axes are in ``solids``, pairs of a member's number and a function of places.
-        """
+        """Chains and places on them, two each, where axes meet in the reference configuration. Or
+        where axes are in ``solids``, pairs of a member's number and a function of places."""
         ends, chains, s, _ = axes = self._axes(np.zeros(self.surfaces.facets.dofs.max() + 1), FINE)
         out, f, near = [], self.surfaces.facets, JOINED * self.height
         for k, contains in solids:
@@ -246,8 +236,7 @@ class Search:
 
     def entered(self, z0: Array, z1: Array) -> complex | None:
         """A place where an axis, or the middle of a solid, enters a solid on a straight path from
-        z0 to z1; None if none does.
-        """
+        z0 to z1; None if none does."""
         f, (ends, chains, s, members) = self.surfaces.facets, self._axes(z0, COARSE)
         solid = np.flatnonzero(~np.isin(f.members, members))  # edges of bodies and domains
         if not len(solid):

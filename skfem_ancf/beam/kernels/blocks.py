@@ -139,9 +139,7 @@ def cable_strains(rest, d, r, E):
 @source
 def directions(t, r, dd, X):
     """Directions in which a change of the rows from r to r + dd changes the strain; returns them.
-
-    They are derivatives without dd. Those of sections are means of the rows.
-    """
+    They are derivatives without dd. Those of sections are means of the rows."""
     cable = t.kind != SECTION
     if len(dd) == 0:
         if cable:
@@ -242,10 +240,8 @@ def from_points(t, first, S, T):
 
 @source
 def stresses(t, first, E, change, T):
-    """Weighted stresses of strains E.
-
-    With a ``change`` about E, their work on it is the change of the energy.
-    """
+    """Weighted stresses of strains E. With a ``change`` about E, their work on it is the change of
+    the energy."""
     if t.law.kind == LINEAR:
         times(t.pattern.pairs, block(t.H, first), E, T)
     else:

@@ -17,10 +17,8 @@ from .tables import CABLE, StrainTables
 
 
 class Past(NamedTuple):
-    """A history (n,) at the start of an increment, and the time ``span`` (1,) since.
-
-    ``now`` (n,) has the eigenstrains at the end, where the history has those at the start.
-    """
+    """A history (n,) at the start of an increment, and the time ``span`` (1,) since. ``now`` (n,)
+    has the eigenstrains at the end, where the history has those at the start."""
 
     history: Array
     span: Array
@@ -91,9 +89,7 @@ class ElementsWithHistory(Elements):
 
     def evaluate(self, E: Array, dt: float | None = None) -> tuple[Array, Array, Array]:
         """Stress (c, points, ne), moduli (c, c, points, ne) and history at strains at the points.
-
-        They are at the end of the increment; with ``dt = 0`` at its start.
-        """
+        They are at the end of the increment; with ``dt = 0`` at its start."""
         E = E - (self.now if dt is None else self.before)
         dt = float(self.span[0]) if dt is None else dt
         if self._fibres:
@@ -116,10 +112,8 @@ class ElementsWithHistory(Elements):
 
     def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
                ) -> Array:
-        """Weighted stresses (ns, ne); with a ``change`` of the strain the mean of both ends.
-
-        The work of this mean is the change of the stored energy and what is dissipated.
-        """
+        """Weighted stresses (ns, ne); with a ``change`` of the strain the mean of both ends. The
+        work of this mean is the change of the stored energy and what is dissipated."""
         if change is None:
             return self._weighted(self.evaluate(self.at_points(strain))[0])
         E, half = self.at_points(strain), 0.5 * self.at_points(change)

@@ -92,9 +92,8 @@ def law_evaluate(law, strain, out):
 @source
 def conserve(law, middle, change, S):
     """Correct the mean stress S so that its work equals the change of energy, by Gonzalez (2000).
-
-    ``middle`` and ``change`` are the mean of both strains and their difference, (3, n, elements).
-    """
+    ``middle`` and ``change`` are the mean of both strains and their difference, (3, n,
+    elements)."""
     n, size = S.shape[1], S.shape[2]
     x, W = np.empty((3, 2 * n, size), S.dtype), np.empty((1, 2 * n, size), S.dtype)
     before, after, old, new = x[:, :n], x[:, n:], W[0, :n], W[0, n:]

@@ -19,10 +19,8 @@ from .law import LINEAR, conserve, law_evaluate
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
 def force(t, u, v, given, out, f):
     """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
-
     Given stresses act in place of those of the strain; without ``out``, they act without the
-    constant stiffness.
-    """
+    constant stiffness."""
     R, m, ns, du, moving = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v.copy(), v.size > 0
     if moving:
         add_multiple(-1.0, u, du)

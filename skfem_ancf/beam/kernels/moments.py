@@ -70,10 +70,8 @@ def mean_turning(a, b, g):
 
 @apart("moments", MomentPack, F1, F1, F1, F1)
 def add_mean_moments(moments, factors, u0, u1, f):
-    """Add the mean forces from u0 to u1, whose work is the moments times the rotations.
-
-    A couple acts on the angle between its two sections, without resultant moment.
-    """
+    """Add the mean forces from u0 to u1, whose work is the moments times the rotations. A couple
+    acts on the angle between its two sections, without resultant moment."""
     M, opposite = moments.M, moments.opposite
     a, b, g = np.empty((4, 1)), np.empty((4, 1)), np.empty((4, 1))
     for k in range(M.size):

@@ -102,10 +102,8 @@ def run_viscous(e, u, v, f):
 
 @kernel
 def run_tangent(e, u, given, out, f, flat, ld):
-    """Tangent and force at u; writes the stresses.
-
-    The geometric part has the given stresses, or those of the strain if there are none.
-    """
+    """Tangent and force at u; writes the stresses. The geometric part has the given stresses, or
+    those of the strain if there are none."""
     U, d, one = e.at(u)
     Y, strain = e.directions(one, one), e.strain(d, one)
     T, moduli = e.stress_and_moduli(strain)
@@ -141,10 +139,8 @@ def run_unsymmetric(e, u, v, flat, ld):
 
 
 def _shift(e, given):
-    """Stresses of linear laws, or the shift of the strain of others; the other is None.
-
-    Laws with a history have it in their strain, see :func:`run_put`, and no further stress.
-    """
+    """Stresses of linear laws, or the shift of the strain of others; the other is None. Laws with a
+    history have it in their strain, see :func:`run_put`, and no further stress."""
     if e.t.law.kind == LINEAR:
         return _given(e, given), None
     if e.t.law.kind == HISTORY:
@@ -161,10 +157,8 @@ def run_put(e, given):
 
 @kernel
 def run_eigen_force(e, u, given, f):
-    """Change of the force at u by eigenstrains.
-
-    ``given`` are stresses for a linear law, else strains at the points, (3, points, ne).
-    """
+    """Change of the force at u by eigenstrains. ``given`` are stresses for a linear law, else
+    strains at the points, (3, points, ne)."""
     _, d, one = e.at(u)
     T, shift = _shift(e, given)
     if T is None:
