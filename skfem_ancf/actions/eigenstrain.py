@@ -403,15 +403,9 @@ def _resultants(beam, eigen, rules):
 
 def products(name: str, function: Callable[..., Any], beam: Beam
              ) -> list[tuple[Callable[..., Any], Coefficient]]:
-    """A function (x, y, t) as a sum of products of functions of (x, y) and of t.
-
-    By empirical interpolation at some times and as many places; exact where such a sum exists.
-
-    References
-    ----------
-    Barrault, Maday, Nguyen, Patera: "An empirical interpolation method", Comptes Rendus
-    Mathematique 339 (2004).
-    """
+    """A function (x, y, t) as a sum of products of functions of (x, y) and of t, exact where such a
+    sum exists: by empirical interpolation at some times and as many places (Barrault, Maday,
+    Nguyen, Patera: "An empirical interpolation method", Comptes Rendus Mathematique 339 (2004))."""
     X = np.array(np.meshgrid(np.linspace(0.02, 0.97, 7), np.linspace(0.01, 0.98, 9))
                  ).reshape(2, -1)
     x, y = (c.ravel() for c in beam.across.coordinates(X))

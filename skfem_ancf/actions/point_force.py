@@ -92,17 +92,8 @@ class DirectedForce(Load):
 
 
 class OffAxisForce(DirectedForce):
-    """A dead force F at ``r + Y n``, n the unit normal of the axis, with its potential.
-
-    Parameters
-    ----------
-    force
-        The force, shape (2,).
-    e, X
-        Element of the cable, and reference point (2,).
-    beam, amplitude
-        As for :class:`~skfem_ancf.actions.loads.Load`; the beam is a Beam.
-    """
+    """A dead force (2,) at ``r + Y n`` of a cable, n the unit normal of the axis, with its
+    potential; at the reference point X (2,) of element ``e``."""
 
     def __init__(self, force: Array, e: int, X: Array, beam: Any, amplitude: Any = None) -> None:
         super().__init__(beam, amplitude)

@@ -531,23 +531,8 @@ def grade_of(domain: Domain, x: Array) -> Any:
 
 
 def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array, Array]:
-    """Points and cells for plots.
-
-    Parameters
-    ----------
-    domain
-        The Domain.
-    u
-        Displacement, shape (N,).
-    parts
-        Number of refinements of each cell.
-
-    Returns
-    -------
-    x, moved, gradient, cells
-        Points, (2, n), their displacement and its gradient, (2, 2, n), and triangles or quads
-        as rows of point numbers.
-    """
+    """Points (2, n), their displacement and its gradient (2, 2, n), and triangles or quads, with
+    ``parts`` refinements of each cell, for plots."""
     mesh, basis = domain.basis.mesh, domain.basis
     cell = mesh.init_refdom().refined(parts)
     x = np.asarray(basis.mapping.F(cell.p))

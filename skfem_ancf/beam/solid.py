@@ -21,15 +21,8 @@ def tensor(S: Array) -> Array:
 
 
 def moduli_at(law: Any, F: Array, strain: Array) -> Array:
-    """Derivatives (2, 2, 2, 2, ...) of the first Piola-Kirchhoff stress by F, in one frame.
-
-    Parameters
-    ----------
-    law
-        A material's law.
-    F, strain
-        Deformation gradient (2, 2, ...) and its Green-Lagrange strain (3, ...).
-    """
+    """Derivatives (2, 2, 2, 2, ...) of the first Piola-Kirchhoff stress by F (2, 2, ...), at the
+    Green-Lagrange strain (3, ...), in one frame."""
     k = np.array([[0, 2], [2, 1]])
     D = law.moduli(strain)[k][:, :, k]
     A = np.einsum("iI...,IJKL...,kK...->iJkL...", F, D, F, optimize=True)
@@ -89,17 +82,9 @@ def scattered(K: Array, basis: Any) -> tuple[Any, Array, tuple[int, int], tuple[
 
 
 class SolidForms:
-    """Energy, force, tangent and mass of a material at the displacement ``w["u"]``.
-
-    ``mass`` is None for a material without density.
-
-    Parameters
-    ----------
-    material
-        A material without a history; its functions E and density are of global coordinates.
-    width
-        Thickness out of the plane, positive.
-    """
+    """Energy, force, tangent and mass of a material without a history at the displacement
+    ``w["u"]``. Functions of the material are of global coordinates; ``mass`` is None without
+    density."""
 
     def __init__(self, material: Material, width: float) -> None:
         require_like("material", material, "Material", "law", "reference")

@@ -42,15 +42,8 @@ def dense(A: Any) -> Array:
 
 
 class Inertia(NamedTuple):
-    """Signs of the eigenvalues of a symmetric matrix.
-
-    Attributes
-    ----------
-    negative : int
-        Number of negative eigenvalues.
-    singular : bool
-        True if an eigenvalue is zero to round-off.
-    """
+    """Signs of the eigenvalues of a symmetric matrix: the number of negative ones, and whether one
+    is zero to round-off."""
 
     negative: int
     singular: bool

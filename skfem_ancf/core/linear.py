@@ -33,8 +33,6 @@ def step(base: Any, value: Any) -> Any:
 def first_order(z: Any) -> Any:
     """Linearised value of a function from its result at a :func:`step`; real results pass.
 
-    Examples
-    --------
     >>> first_order(step(2.0, 5.0) ** 2)
     16.0
     """

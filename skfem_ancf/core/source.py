@@ -84,8 +84,6 @@ def primitive(module: str) -> Callable[[_Function], _Function]:
 def indices(*ends):
     """Indices as of ``range(*ends)``: one slice in NumPy, integers in compiled code.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> from skfem_ancf.core.source import indices
     >>> x, y = np.arange(3.0), np.empty(3)

@@ -42,27 +42,21 @@ AT_REST = 1e-7
 
 
 class StepSize:
-    """Chooses steps so that the error of every point is about ``rtol`` times the size of the scene.
+    """Chooses steps so that the error of every point is about ``rtol`` times the size of the scene,
+    or of motions that are small beside it :data:`OF_MOTION` times ``rtol`` of their root mean
+    square.
 
-    For motions that are small beside the scene it is :data:`OF_MOTION` times ``rtol`` of the
-    largest displacement since the start, a root mean square as the error is.
-
-    A step may add an error in proportion to its size (error per unit step). The error is a root
-    mean square weighted by mass, times :data:`LARGEST`. Parts of the estimate that do not
-    accumulate are removed:
+    A step may add an error in proportion to its size (error per unit step: Hairer, Norsett, Wanner:
+    "Solving ordinary differential equations I", II.4). The error is a root mean square weighted by
+    mass, times :data:`LARGEST`. Parts of the estimate that do not accumulate are removed:
 
     * what supports and joints undo (a single step counts in full),
-    * what the step does not resolve, by the iteration matrix as a filter,
+    * what the step does not resolve, by the iteration matrix as a filter (Shampine, Baca: "Error
+      estimators for stiff differential equations", J. Comp. Appl. Math. 11 (1984)),
     * what is damped, in collocation,
     * in schemes of second order, vibrations whose phase is lost anyway, by two running averages
       over the time W. After the time T a vibration of frequency w has the phase error C w^3 dt^2 T,
       so W = (C dt^2 T)^(1 / 3) / 2.
-
-    References
-    ----------
-    Error per unit step: Hairer, Norsett, Wanner: "Solving ordinary differential equations I",
-    II.4. The first filter: Shampine, Baca: "Error estimators for stiff differential equations",
-    Journal of Computational and Applied Mathematics 11 (1984).
     """
 
     def __init__(self, system: System, scheme: Scheme, rtol: float, t_start: float,

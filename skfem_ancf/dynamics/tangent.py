@@ -54,15 +54,9 @@ def to_damping_velocity(free, rule, s, w):
 
 @apart("motion", *ALL)
 def internal_force(e, matrices, rule, s, w, state):
-    """The internal force of the iterate without damping.
-
-    In the mixed iteration with independent stresses S, the residual of ``S = D eps(u)`` acts in the
-    directions of the factors::
-
-        f = B(u)^T S + B(origin)^T (D eps(u) - S)
-
-    and likewise for viscous stresses.
-    """
+    """The internal force of the iterate without damping. In the mixed iteration with independent
+    stresses S, the residual of ``S = D eps(u)`` acts in the directions of the factors: ``f = B(u)^T
+    S + B(origin)^T (D eps(u) - S)``, and likewise for viscous stresses."""
     u0, u, f, S = w.y[0], w.x.u, w.x.force, w.stresses
     missing, independent, constitutive, slow, rates = S[2], S[3], S[4], S[5], S[6]
     if state.mixed_steps[0] > 0:

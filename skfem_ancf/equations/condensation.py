@@ -127,13 +127,7 @@ class Condensed:
     # factors
 
     def factorize(self, u: Array, multipliers: Array) -> None:
-        """Factorise at a displacement (N,) and multipliers (m,), with the symmetric part of K.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError, RuntimeError
-            If the matrix is singular.
-        """
+        """Factorise at u and multipliers, with the symmetric part of K; LinAlgError if singular."""
         self.at = u.copy(), multipliers.copy()
         K = self._K if self._K.symmetric else self._K.symmetric_part()
         turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
@@ -181,13 +175,7 @@ class Condensed:
     # solution
 
     def solve(self, b: Array, phi: Array) -> tuple[Array, Array]:
-        """Solve for forces b (N,) and constraint residuals phi (m,), or for columns of both.
-
-        Returns
-        -------
-        x, multipliers
-            In the shapes of b and phi.
-        """
+        """x and multipliers for forces b (N,) and residuals phi (m,), or for columns of both."""
         lu, k = self._nodes[1], b[:1].size
         v, x = (self._moved @ phi.reshape(-1, k)).reshape(-1, 6, k), np.zeros((len(b), k))
         f = np.empty(v.shape)

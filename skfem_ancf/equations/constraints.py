@@ -34,35 +34,11 @@ _NO_ENTRIES = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 class Constraints:
     """The supports and joints of a scene.
 
-    Joints that only fix degrees of freedom are eliminated like supports; the others are equations
-    ``Phi(u, t) = 0`` with multipliers. Methods take a displacement u (N,), a time t and multipliers
-    (m,); sparse matrices are rows, columns and values (k,).
-
-    Parameters
-    ----------
-    members, slices
-        Beams, rigid bodies and domains, and their degrees of freedom.
-    size
-        Size of the scene.
-    fixed, values
-        Fixed degrees of freedom and their displacements at full load, shape (n,).
-    joints
-        Bound joints.
-    stiffness
-        A function that returns the stiffness of force elements in the reference configuration,
-        sparse (N, N), or None.
-
-    Attributes
-    ----------
-    all_joints, joints : list
-        All joints, and those with multipliers.
-    N, m : int
-        Numbers of degrees of freedom and of multipliers.
-    fixed, given
-        Degrees of freedom that supports and joints fix, and their displacements at full load
-        without prescribed motions of joints, shape (n,).
-    free, mask
-        Whether a degree of freedom is free, as bool and as float, shape (N,).
+    Joints that only fix DOFs are eliminated like supports; the others, :attr:`joints`, are
+    equations ``Phi(u, t) = 0`` with m multipliers. Methods take a displacement u (N,), a time t and
+    multipliers (m,); sparse matrices are rows, columns and values (k,). ``free`` and ``mask`` (N,)
+    are bool and float; ``given`` are the displacements of the ``fixed`` DOFs at full load, without
+    motions of joints; ``stiffness()`` is that of force elements at rest, sparse (N, N), or None.
     """
 
     def __init__(self, members: Sequence[Beam | RigidBody], slices: Sequence[slice], size: float,
@@ -419,15 +395,11 @@ class Constraints:
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
     def force_on(self, selected: Array, multipliers: Array, rest: Array) -> tuple[Array, Array]:
-        """Support-like forces: of constant joints that involve only selected DOFs (N,).
+        """Support-like forces (N,), of constant joints of selected DOFs alone, and which DOFs they
+        have.
 
-        A scheme that has the equations of motion inside of steps leaves a ``rest`` (N,) of all
-        forces at their end. As the force of fixed DOFs, that of these joints balances its part.
-
-        Returns
-        -------
-        force, touched
-            The force on the DOFs, and whether a DOF belongs to such a joint, shape (N,).
+        As the force of fixed DOFs, that of these joints balances the ``rest`` (N,) of all forces
+        that a scheme with the equations of motion inside of steps leaves at their end.
         """
         force, touched, zero = np.zeros(self.N), np.zeros(self.N, dtype=bool), np.zeros(self.N)
         found = []

@@ -24,22 +24,10 @@ class Histories:
     A history is a value, an array (n,), and the equations of a scene are functions of it:
     :meth:`skfem_ancf.equations.system.System.after` returns those after a history. States,
     histories and checkpoints store it; :meth:`accept` computes the next one at the end of an
-    increment. To start again is to take the old one.
-
-    Attributes
-    ----------
-    values
-        The history, shape (n,), an array of these equations alone; its parts are ``of_forces``, of
-        obstacles and springs, that of ``of_beams``, a :class:`Past`, and those of items with a
-        memory. ``rest`` is that at rest.
-    span
-        Time since then, shape (1,), for laws with rates; 0 at once.
-    forces
-        The force elements with this history.
-    lasting
-        1 if steps change it, 3 if that of materials, else 0.
-    dissipates, evolve
-        True if energy may be lost by that; if a material or item has one.
+    increment. ``values`` has the parts ``of_forces`` (obstacles and springs), ``of_beams``, a
+    :class:`Past`, and items with a memory; ``span`` (1,) is the time since, for laws with rates.
+    ``lasting`` is 1 if steps change it, 3 if that of materials, else 0; ``dissipates`` if energy
+    may be lost, ``evolve`` if a material or item has a history.
     """
 
     def __init__(self, forces: Forces, beams: Sequence[Beam], slices: Sequence[slice]) -> None:

@@ -102,13 +102,7 @@ class LinearSolver:
         return (marked.flat == 0.0).nonzero()[0], (marked.flat == 1.0).nonzero()[0]
 
     def factorize(self, u: Any = None, t: float = 0.0, multipliers: Any = None) -> None:
-        """Fix the supports in the tangent and factorise it with the joints.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError, RuntimeError
-            If the matrix is singular.
-        """
+        """Fix the supports and factorise with the joints; LinAlgError if it is singular."""
         s, constraints = self._system, self._system.constraints
         (zeros, ones), entries = self._supports, s.K.flat
         entries[zeros], entries[ones] = 0.0, 1.0
@@ -140,13 +134,7 @@ class LinearSolver:
         self._last.joined = NullSpace(s.K, J, more, constraints, self._pattern)
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
-        """Solve for forces (N,) and constraint residuals (m,); returns x and multipliers.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the last factorisation failed.
-        """
+        """x and multipliers for forces (N,) and constraint residuals (m,)."""
         s = self._system
         b, none = residual * s.constraints.mask, np.zeros(0)
         if not self.coupled:
@@ -171,12 +159,9 @@ class LinearSolver:
         return True
 
     def inertia(self) -> Inertia:
-        """Inertia of the factorised tangent at the free DOFs, on the null space of J.
+        """Inertia of the symmetric part of the factorised tangent at the free DOFs, on the null
+        space of J.
 
-        An unsymmetric tangent is replaced by its symmetric part.
-
-        Examples
-        --------
         >>> import numpy as np
         >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
         >>> scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(5),
@@ -243,16 +228,9 @@ class Alone:
 
 
 class Schur:
-    """Factors of ``[K, J^T; J, 0]`` by those of a positive definite band matrix K.
-
-    Equations between neighbouring DOFs, such as a clamp at an angle, are added to K with a
-    stiffness w: ``K + J^T w J`` has the same solution x, and l is smaller by w c.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the matrix is not positive definite; K is unchanged.
-    """
+    """Factors of ``[K, J^T; J, 0]`` by those of a band matrix K; LinAlgError if that is not
+    positive definite. Equations between neighbouring DOFs, such as a clamp at an angle, are added
+    to K with a stiffness w: ``K + J^T w J`` has the same solution x, and l is smaller by w c."""
 
     def __init__(self, K: BandMatrix, J: Any, constraints: Any) -> None:
         self._K, self._J, before = K, constraints.to_dense(*J), K.flat.copy()
@@ -285,20 +263,8 @@ class Schur:
 # matrix T^T K T is symmetric if K is, and its pivots give the inertia
 
 def eliminated(A: Array) -> tuple[Array, Array, Array]:
-    """Reduced row echelon forms of matrices (g, k, c), with complete pivoting.
-
-    Returns
-    -------
-    pivots
-        The pivot column of each row, (g, k).
-    R, M
-        ``M A = R``, (g, k, c) and (g, k, k): each pivot of R is 1 and alone in its column.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the rows are dependent.
-    """
+    """Pivot columns (g, k), reduced row echelon forms R, and M with ``M A = R``, of matrices A (g,
+    k, c), with complete pivoting; LinAlgError if rows are dependent."""
     g, k, c = A.shape
     size = np.max(np.abs(A), axis=2, initial=0.0)
     if not np.all(size):

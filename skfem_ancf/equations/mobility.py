@@ -28,18 +28,11 @@ CORRECTIONS = 12
 
 
 def repeated(constraints: Any) -> tuple[Array | None, bool]:
-    """The redundant equations of joints.
+    """The redundant equations of joints, and whether they are dependent in this position only.
 
-    An equation is redundant if its row of J is a linear combination of others, at the start and
-    after a small random motion that the joints allow, and if it is closed. A linkage in a singular
-    position has such rows at the start only. No equation involved may depend on time.
-
-    Returns
-    -------
-    ndarray or None
-        Increasing numbers of the equations; None if there are dependent equations of another kind.
-    bool
-        True if these are dependent in this position only, and closed there.
+    A redundant equation is closed, and a linear combination of others in J at the start and after a
+    small random motion that the joints allow: a linkage in a singular position has such rows at the
+    start only. None involved may depend on time; None for dependent equations of another kind.
     """
     c, found, passing = constraints, [], False
     start = np.zeros(c.N)

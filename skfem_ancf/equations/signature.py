@@ -28,24 +28,9 @@ MOST, ITERATIONS = 8, 6
 
 def first_dependent(J: Array | sparse.csr_array, free: Array,
                     phi: Callable[[], Array]) -> tuple[int, float] | None:
-    """The first row of J (m, N) that depends on those before it at free DOFs, or None.
-
-    The rows are split into groups without a common column; each is orthogonalised by QR in order.
-
-    Parameters
-    ----------
-    J
-        Shape (m, N).
-    free
-        Whether a DOF is free, shape (N,).
-    phi
-        A function that returns the residuals (m,).
-
-    Returns
-    -------
-    tuple or None
-        The number of the row, and its residual when those before it are met.
-    """
+    """The first row of J (m, N) that depends on those before it at free DOFs, or None; with its
+    residual of ``phi()`` (m,) when those before it are met. Rows are orthogonalised by QR in order,
+    in groups without a common column."""
     size = np.sqrt((J * J).sum(axis=1))
     first = None
     for rows, _, A in groups(J * free):
@@ -64,14 +49,8 @@ def first_dependent(J: Array | sparse.csr_array, free: Array,
 
 
 def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
-    """Split the rows of a sparse matrix into groups without a common column.
-
-    Yields
-    ------
-    rows, columns, A
-        Increasing row numbers, numbers of nonzero columns, and the dense submatrix. A dense matrix
-        is one group.
-    """
+    """Yield row numbers, numbers of nonzero columns and dense submatrices of the groups of rows of
+    a sparse matrix that have no common column; a dense matrix is one group."""
     if isinstance(J, np.ndarray):
         columns, = J.any(axis=0).nonzero()
         if len(J):
@@ -125,15 +104,8 @@ def _members(group, number):
 
 
 def inertia_of(A: Array | sparse.csr_array) -> Inertia:
-    """The :class:`~skfem_ancf.core.band.Inertia` of a symmetric matrix.
-
-    For a sparse matrix it follows from the pivots of ``L D L^T``, by Sylvester's law.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the matrix has no factors with diagonal pivots.
-    """
+    """The :class:`~skfem_ancf.core.band.Inertia` of a symmetric matrix, a sparse one by the pivots
+    of ``L D L^T`` (Sylvester's law); LinAlgError if it has no factors with diagonal pivots."""
     size = np.abs(A.diagonal())
     if not len(size):
         return Inertia(0, False)

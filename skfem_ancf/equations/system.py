@@ -127,45 +127,16 @@ class System:
     """The discrete equations of a scene.
 
     The unknowns are the displacement ``u`` of all degrees of freedom from the reference
-    configuration, and a multiplier for each equation of a joint:
-    ``M u'' + f(u) + J^T lambda = load Q(u)``, ``Phi(u, t) = 0``, ``J = dPhi / du``.
+    configuration, and a multiplier for each equation of a joint: ``M u'' + f(u) + J^T lambda = load
+    Q(u)``, ``Phi(u, t) = 0``, ``J = dPhi / du``. Methods take displacement and velocity u and v
+    (N,), time t (None for loads at full size) and the load factor of statics.
 
-    Parameters
-    ----------
-    beams, loads, bodies, domains
-        Beams, loads, rigid bodies and domains. DOFs are numbered in the order beams, bodies,
-        domains.
-    fixed, values
-        Fixed degrees of freedom and their displacements at full load, shape (n,).
-    joints, elements
-        Bound joints and force elements.
-    damping
-        A :class:`~skfem_ancf.materials.damping.Damping`, or None.
-    rest_modes
-        ``rest_modes(system, k)`` returns k angular frequencies above those of rigid motions about
-        the reference configuration, and their shapes (k, N), for modal damping.
-
-    Other Parameters
-    ----------------
-    u, v, t
-        Displacement and velocity, shape (N,), and time; None for loads at full size.
-    load
-        Load factor of statics.
-
-    Attributes
-    ----------
-    members : list
-        Beams, rigid bodies and domains, with ``slices`` of the degrees of freedom.
-    symmetric : bool
-        True if all loads and force elements have a potential.
-    items : tuple or None
-        The actions as the user gave them, for plots; None in a copy in another process.
-    derivatives : callable or None
-        For derivatives of a State by parameters, see :class:`~skfem_ancf.scene.design.Gradient`.
-    units : tuple of str or None
-        Units of force and length, for plots and files.
-    clock : float or None
-        The time of functions of time in statics, see :meth:`at`; None for full load.
+    DOFs are in the order of the ``members``: beams, bodies, domains; ``fixed`` ones have the
+    displacements ``values`` at full load. ``rest_modes(system, k)`` returns k angular frequencies
+    and shapes (k, N) for modal damping. ``symmetric``: all loads and force elements have a
+    potential; ``items`` are the actions as given, for plots (None in a copy in another process),
+    ``derivatives`` those of a :class:`~skfem_ancf.scene.design.Gradient`, ``clock`` the time in
+    statics, see :meth:`at`.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
@@ -467,23 +438,10 @@ class System:
 
     def assemble(self, u: Array, load: float = 1.0, independent: Array | None = None,
                  geometric: bool = True, t: float | None = None) -> tuple[Array, Array]:
-        """Assemble the tangent of the residual in :attr:`K`.
+        """The internal force (N,) and stresses (n,); the tangent of the residual is in :attr:`K`.
 
-        Parameters
-        ----------
-        u
-            Displacement, shape (N,).
-        load, t
-            Load factor and time of the loads, which may have a stiffness.
-        independent
-            Independent stresses (n,) for the geometric part, see :meth:`linearised_stress`.
-        geometric
-            Include the geometric part and the stiffness of follower loads; linear theory does not.
-
-        Returns
-        -------
-        force, stresses
-            The internal force (N,), and the stresses (n,).
+        Its geometric part, with the stiffness of follower loads, has the ``independent`` stresses
+        (see :meth:`linearised_stress`) if given; linear theory has none.
         """
         self._require_displacement(u)
         t = self.clock if t is None else t

@@ -45,15 +45,7 @@ TYPICAL = {
 
 
 def values_of(name: str, units: Any) -> tuple[dict[str, float], str]:
-    """Arguments of a material in units of force and length, and what is said of them.
-
-    Raises
-    ------
-    NameUnknown
-        If the name is not known.
-    InputError
-        If the units are not.
-    """
+    """Arguments of a material in units of force and length, and what is said of them."""
     try:
         force, length = FORCES[units[0]], LENGTHS[units[1]]
     except (KeyError, TypeError, IndexError):

@@ -39,24 +39,13 @@ def plane_sections(constants, xx, yy, xy):
 
 
 class PlaneSections(PointwiseMaterial):
-    """The geometrically exact beam (Reissner, Simo) of one point of its section.
+    """The geometrically exact beam of one point of its section (Reissner: "On one-dimensional
+    finite-strain beam theory: the plane problem", Z. angew. Math. Phys. 23 (1972); Simo).
 
-    The axial stress is E times the stretch normal to the section minus one, the shear stress is G
-    times the derivative of the position within the section. Both are linear in the strains of
-    Reissner's beam for sections that stay plane and keep their size. A large stiffness holds the
-    size: with a curvature kappa its change is ``EI kappa^2 / (1e4 EA)``.
-
-    Parameters
-    ----------
-    E, shear
-        Axial and shear modulus.
-    density
-        Mass per volume, or None.
-
-    References
-    ----------
-    Reissner: "On one-dimensional finite-strain beam theory: the plane problem", Zeitschrift fuer
-    angewandte Mathematik und Physik 23 (1972).
+    The axial stress is E times the stretch normal to the section minus one, the shear stress is
+    ``shear`` times the derivative of the position within the section. Both are linear in the
+    strains of Reissner's beam for sections that stay plane and keep their size, which a large
+    stiffness holds: with a curvature kappa its change is ``EI kappa^2 / (1e4 EA)``.
     """
 
     point = staticmethod(plane_sections)

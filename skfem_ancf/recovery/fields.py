@@ -481,8 +481,6 @@ def units_of(state: Any) -> tuple[str, str] | None:
 def unit_of(field: Field, units: tuple[str, str] | None) -> str:
     """The unit of a field from those of force and length; "1" if dimensionless.
 
-    Examples
-    --------
     >>> from skfem_ancf.recovery.fields import FIELDS, unit_of
     >>> [unit_of(FIELDS["von_mises"], units) for units in (None, ("N", "mm"), ("lbf", "in"))]
     ['force / area', 'MPa', 'lbf/in²']

@@ -62,18 +62,12 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_deg
     tenfold with each degree so far (smooth solutions), and halved elements for the others. The
     difference is the estimate: of the displacement of the beams' ends relative to the size of the
     scene, and of the strain energy, relative. For the next round smooth beams take the higher
-    degree; in the others the elements are halved that contribute most to the difference in the
-    energy norm. Beams on a curve are always halved, as a higher degree does not improve their
-    geometry.
+    degree (Melenk, Wohlmuth: "On residual-based a posteriori error estimation in hp-FEM", Advances
+    in Computational Mathematics 15 (2001)); in the others the elements are halved that contribute
+    most. Beams on a curve are always halved, as a higher degree does not improve their geometry.
 
     With the goal "strain" the estimate is the difference of the elements' strain and the recovered
-    one (:mod:`skfem_ancf.recovery`) in the L2 norm, relative to that of the strain, and the
-    elements that contribute most are halved.
-
-    References
-    ----------
-    Melenk, Wohlmuth: "On residual-based a posteriori error estimation in hp-FEM", Advances in
-    Computational Mathematics 15 (2001), for the choice by the reduction that was predicted.
+    one in the L2 norm, relative, and the elements that contribute most are halved.
     """
     tol = require_positive("adapt", tol)
     max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
@@ -180,15 +174,11 @@ def _changed(scene, marked, elements):
 def frequency_errors(scene: Any, modes: Modes) -> Array:
     """Relative errors (k,) of frequencies at rest by the mesh of the beams; NaN if not known.
 
-    A ModelWarning says where they are large. They are the change as all elements are halved, times
-    4/3: the sum of all further changes for elements of second order. It is a quarter too large for
-    elements of fourth order. The shapes are carried over to the halved elements and improved there
-    by two steps of subspace iteration.
-
-    References
-    ----------
-    Xu, Zhou: "A two-grid discretization scheme for eigenvalue problems", Mathematics of
-    Computation 70 (2001).
+    They are the change as all elements are halved, times 4/3: the sum of all further changes for
+    elements of second order, a quarter too large for those of fourth order. The shapes are improved
+    on the halved elements by two steps of subspace iteration (Xu, Zhou: "A two-grid discretization
+    scheme for eigenvalue problems", Mathematics of Computation 70 (2001)). A ModelWarning says
+    where errors are large.
     """
     nothing = np.full(len(modes.frequencies), np.nan)
     if scene.layout.N > MOST_HALVED or not scene.beams or np.iscomplexobj(modes.shapes):

@@ -386,17 +386,8 @@ class Differences:
 
 
 class Gradient(Design):
-    """Derivatives by parameters by object and name in a state that is known.
-
-    Parameters
-    ----------
-    scene, state
-        The scene, and its static solution.
-    wrt
-        See :class:`~skfem_ancf.scene.parameters.Parameters`.
-    readings
-        As for :class:`Design`.
-    """
+    """Derivatives by the :class:`~skfem_ancf.scene.parameters.Parameters` ``wrt`` of a scene in its
+    known static solution; ``readings`` as for :class:`Design`."""
 
     def __init__(self, scene: Any, state: State, wrt: Sequence[Any],
                  readings: Sequence[Any] = ()) -> None:

@@ -296,7 +296,8 @@ def _begin(system, t, start, u, rules, stable):
 
 def follow(system: System, ends: Array, increments: int, begin: Instant, rules: Rules,
            stable: bool) -> Iterator[Instant]:
-    """Yield equilibria from ``begin`` on.
+    """Yield equilibria from ``begin`` on, at instants of grids of ``increments`` between the
+    ``ends``.
 
     Each follows from the one before, by the mixed iteration, then by Newton's method, or by a
     descent if obstacles or only loads stabilise the scene. An increment that fails or moves the
@@ -304,10 +305,6 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
     equilibrium becomes unstable, the strategies of :func:`~skfem_ancf.solvers.newton.solve_static`
     look for another one under constant loads. If increments stay below a hundredth of those asked
     for, they take the next one as a whole, with a ModelWarning, so that the work is bounded.
-
-    ``ends`` are increasing times; ``increments`` is the number of instants of a grid between two of
-    them. Increments end at each of these instants, also after cuts. Raises LoadStepFailed or
-    ConvergenceError.
     """
     yield begin
     jumps, slow, drag = 0, 0, drag_of(system)

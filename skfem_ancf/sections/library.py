@@ -100,13 +100,7 @@ def _found(series, number, rows):
 
 @lru_cache(64)
 def shape_of(name: str) -> Shape:
-    """The height and the sides of a profile, in mm.
-
-    Raises
-    ------
-    NameUnknown
-        If the series or the size is not known.
-    """
+    """The height and the sides of a profile, in mm; NameUnknown."""
     match = re.fullmatch(r"\s*([A-Za-z]+)\s*([\d.,\sx×X*]+?)\s*", name)
     series = match.group(1).upper() if match else name
     number = re.sub(r"[\s×X*]+", "x", match.group(2).replace(",", ".")) if match else ""

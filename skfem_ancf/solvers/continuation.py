@@ -44,10 +44,9 @@ class Point(MaterialPoints):
     ``force`` (N,) are its data; ``arc`` is the arc length from the start, ``error`` the error that
     the last correction leaves in the energy norm, relative to the work done, ``iterations`` the
     linear systems solved. ``rate``, ``tangent`` (N,) and ``multiplier_rate`` (m,) are derivatives
-    of load, displacement and multipliers by the arc length; at a critical point they are the null
-    vector. ``negative`` is the number of negative eigenvalues of the tangent stiffness on the null
-    space of J, None if loads have no potential. ``history`` is what forces remember of the path
-    before.
+    of load, displacement and multipliers by the arc length, at a critical point the null vector.
+    ``negative`` is the number of negative eigenvalues of the tangent stiffness on the null space of
+    J, None if loads have no potential.
     """
 
     system: System

@@ -85,12 +85,10 @@ class Descent:
 
     A multiple of the identity (in scaled DOFs) is added to the tangent until it is positive
     definite and the correction is within a radius (Levenberg-Marquardt; Conn, Gould, Toint:
-    Trust-Region Methods (2000), 7.3). Close to a minimum nothing is added, which is Newton's
-    method.
-
-    ``radius`` is the initial radius, the largest change of a scaled DOF. It is halved if
-    corrections reverse, and grows to five times that if they continue. ``saw_unstable`` is True
-    once a direction of negative curvature was met.
+    Trust-Region Methods (2000), 7.3), which starts as ``radius``, the largest change of a scaled
+    DOF. It is halved if corrections reverse, and grows to five times that if they continue. Close
+    to a minimum nothing is added: Newton's method. ``saw_unstable`` is True once a direction of
+    negative curvature was met.
     """
 
     def __init__(self, system: System, radius: float = RADII[0]) -> None:

@@ -36,12 +36,11 @@ REAL = 1e-7  # relative imaginary part of a real eigenvalue
 def modes(system: System, state: State, k: int) -> Modes:
     """The k lowest natural frequencies about a state (smallest real part of ``lambda``).
 
-    The eigenvalues of ``K x = lambda M x`` are computed as the largest of ``(K + s M)^-1 M`` with a
-    small shift s. Solutions are refined by strains instead of assembled stiffnesses, and
-    eigenvalues are quotients of sums of squared strains. Low (bending) frequencies are therefore
-    accurate although the highest eigenvalues are ``(L / h)^4`` times larger. With loads without a
-    potential, K is unsymmetric and eigenvalues may be complex. Points stick that touch an obstacle
-    with friction, also those that slip.
+    The eigenvalues of ``K x = lambda M x`` are the largest of ``(K + s M)^-1 M`` with a small shift
+    s. Solutions are refined by strains, and eigenvalues are quotients of sums of squared strains:
+    low (bending) frequencies are accurate although the highest eigenvalues are ``(L / h)^4`` times
+    larger. Without a potential they may be complex. Points that touch with friction stick, also if
+    they slip.
     """
     system = system.after(state.memory).sticking()
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
@@ -251,15 +250,9 @@ def buckling(system: System, k: int, state: State | None = None) -> Buckling:
 
     ``(K_0 + factor K_s) phi = 0``, with the geometric stiffness K_s of the linear stress under full
     load, including support displacements and load stiffness. Factors with a prebuckling strain of
-    order one are omitted. If loads have no potential, K_s is unsymmetric, and only real factors
-    (divergence) are found.
-
-    With a state, which may have other loads, K_0 is its tangent: its loads are constant, those of
-    the system are added. Without one, the state is that without loads, in which prestressed springs
-    and energies that are not scaled may push.
-
-    Raises InputError if the loads cause no buckling, if the beam touches an obstacle first, if
-    springs are one-sided, or if the state is not stable.
+    order one are omitted; without a potential, only real factors (divergence) are found. With a
+    state, whose loads are constant, K_0 is its tangent; otherwise that of the state without loads,
+    in which prestressed springs and energies that are not scaled may push.
     """
     system.constraints.require_supports()
     state = state or _prestressed(system)

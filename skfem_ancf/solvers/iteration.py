@@ -48,22 +48,9 @@ class Iterate(NamedTuple):
 
 def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, start: Start,
                      factors: Array, joints: tuple[Array, Array]) -> Iterate:
-    """Iterate to equilibrium.
-
-    Parameters
-    ----------
-    backend
-        The :class:`~skfem_ancf.equations.backend.Backend` of the equations.
-    target, rules, start
-        What to find, how accurately, and where to begin.
-    solver
-        Its ``solve_into`` solves the linear systems, such as a
-        :class:`~skfem_ancf.equations.linear_solver.LinearSolver`.
-    factors
-        Load factors, and those of the first tangent, (2, k).
-    joints
-        c (m,) and g (k,) of the joints at the time.
-    """
+    """Iterate to the ``target`` by the ``rules`` from ``start``; ``solver.solve_into`` solves the
+    linear systems. ``factors`` (2, k) are load factors and those of the first tangent, ``joints`` c
+    and g."""
     x, m = np.zeros((ROWS, len(start.u))), np.zeros((4, len(start.multipliers)))
     stresses, record = np.zeros((2, backend.tables.stresses_size)), np.empty(
         (2, rules.iterations + 1))

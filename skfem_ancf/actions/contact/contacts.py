@@ -85,21 +85,10 @@ class Contacts:
     """The obstacles of a scene: its force elements with ``groups``.
 
     Positions are relative to ``origin``, the middle of the bodies, to reduce round-off in friction.
-    Arguments are displacements and velocities ``u, v``, shape (N,), and the time ``t``, in statics
-    the load factor.
-
-    Their history data include the angles of torsional springs, of which ``springs`` (k, n) are all
-    numbers.
-
-    Attributes
-    ----------
-    obstacles, groups
-        The obstacles, and pairs of an obstacle's number and a :class:`Group`.
-    moving, custom, anchored, augmented
-        True if an obstacle moves, has a user-defined shape, has friction, or uses the augmented
-        Lagrangian.
-    keeps
-        True if there are history data.
+    Arguments are displacements and velocities ``u, v``, (N,), and the time ``t``, in statics the
+    load factor. ``groups`` are pairs of an obstacle's number and a :class:`Group`. An obstacle may
+    be ``moving``, ``custom`` (a user-defined shape), ``anchored`` (friction), ``augmented``;
+    ``keeps`` if there are history data, with the angles of torsional springs, ``springs`` (k, n).
     """
 
     def __init__(self, elements: Sequence[Any], N: int, springs: Sequence[Array] = ()) -> None:

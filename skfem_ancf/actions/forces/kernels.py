@@ -48,23 +48,13 @@ class Kinds(NamedTuple):
 class ForceTables(NamedTuple):
     """The force elements of a scene.
 
-    Attributes
-    ----------
-    start, at, of, weight
-        Vectors in the reference configuration; rows, DOFs and weights of their derivatives.
-    number, ends, numbers
-        Number of elements of the kinds above, ends of kinds among them, and parameters (5 n,).
-    size
-        Length of the derivatives by the vectors: 16 n, and those of user-defined elements.
-    band_at, band_of, band_weight
-        Positions in the band, derivatives and weights.
-    row_at, row_of
-        Positions between the rows of elements that couple distant DOFs.
-    custom, contacts
-        Handle of user-defined elements, 0 for none; the obstacles.
-    changing, clear
-        Number of user-defined elements whose stiffness changes its pattern; where they do nothing,
-        see :func:`~skfem_ancf.actions.contact.tables.is_clear`.
+    ``start, at, of, weight`` are vectors in the reference configuration; rows, DOFs and weights of
+    their derivatives, of the length ``size``. ``number, ends, numbers``: of elements of the kinds
+    above, of kinds among them, and parameters (5 n,). ``band_at, band_of, band_weight`` are
+    positions in the band, derivatives and weights; ``row_at, row_of`` those of elements that couple
+    distant DOFs. ``custom`` is the handle of user-defined elements or 0, of which ``changing``
+    change their pattern; ``clear`` says where they do nothing, see
+    :func:`~skfem_ancf.actions.contact.tables.is_clear`.
     """
 
     start: F1

@@ -42,8 +42,6 @@ class Law:
     ``given`` is the function, or a pair of it and its potential, by default the integral from zero.
     ``name`` and ``of`` are for messages.
 
-    Examples
-    --------
     >>> law = Law("k", lambda s: 3.0 * s**2)
     >>> law(2.0), round(law.potential(2.0), 12), round(law.slope(2.0), 6)
     (12.0, 8.0, 12.0)

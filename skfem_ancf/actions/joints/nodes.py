@@ -62,19 +62,16 @@ FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
 class Nodes(Joint):
     """Ends that meet at a node share its position; rigid ends share its rotation, too.
 
-    The ends are those of all chains of all beams: start and end of the first chain of the first
-    beam come first. At each node the first rigid end, or else the first, is the leader. The
-    equations are ``r_leader - r = 0`` and ``g x g_leader = 0`` with the section direction g
-    relative to the reference configuration, as in :class:`~skfem_ancf.actions.joints.Weld`; then
-    for supports of the leader ``r - r_0 = d`` and ``(cos a, sin a) x g = 0``. Linear solvers use
-    unknowns of the nodes instead of the multipliers, see :mod:`skfem_ancf.equations.condensation`.
-
-    ``nodes, hinged`` are the node of each end, and whether it is hinged, (ends,); ``fixed`` tells
-    whether position x, y and rotation of each node are fixed, (number, 3), and ``settlements`` by
-    how much they are displaced; ``lines`` are the numbers in ``graph`` of the chains, (ends / 2,).
-    Derived: the ``leader`` of each end; ``followers``, and those with equal rotation, ``turned``;
-    leaders with supports ``fixed_x, fixed_y, fixed_angle``; DOFs of ``positions`` (ends, 2) and
-    section ``directions`` (2, ends, n) with ``weights`` (ends, n), padded with zeros.
+    Of all chains of all beams in order, start and end; at each node the first rigid end, or else
+    the first, is the ``leader``. The equations are ``r_leader - r = 0`` and ``g x g_leader = 0``
+    with the section direction g relative to the reference configuration, as in
+    :class:`~skfem_ancf.actions.joints.Weld`; then for supports of the leader ``r - r_0 = d`` and
+    ``(cos a, sin a) x g = 0``. Linear solvers use unknowns of the nodes instead of the multipliers,
+    see :mod:`skfem_ancf.equations.condensation`. ``nodes, hinged`` (ends,) are those of each end;
+    ``fixed`` (number, 3) tells whether x, y and rotation are fixed, ``settlements`` how far they
+    are displaced; ``lines`` (ends / 2,) are numbers in ``graph``. DOFs are those of ``positions``
+    (ends, 2) and of section ``directions`` (2, ends, n) with ``weights`` (ends, n), padded with
+    zeros.
     """
 
     constant = False

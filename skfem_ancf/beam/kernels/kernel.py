@@ -202,16 +202,8 @@ class ElementKernel:
         return out
 
     def gradients(self, u: Array) -> tuple[Array, Array, Array]:
-        """Factors of the material element tangents ``B^T HB``, without cancellation in B.
-
-        Returns
-        -------
-        B, HB
-            Derivatives of strains and weighted stresses, (ne, m, 2 nb), including the
-            stabilisation.
-        stress
-            Weighted stresses, (ne, m): ``B^T stress`` is the internal force.
-        """
+        """B and HB, (ne, m, 2 nb), of the material tangents ``B^T HB`` with the stabilisation, and
+        the weighted stresses (ne, m); without cancellation in B."""
         u, ne, n = self._checked(u), self.t.shape[1], 2 * self.nd
         found, stresses = [], []
         for e in self.elements:

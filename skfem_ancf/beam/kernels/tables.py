@@ -34,23 +34,10 @@ OF_G, OF_FRAME, OF_H, OF_C, OF_WEIGHTS = range(5)
 
 
 class Pattern:
-    """What samples of strain depend on and what couples them, without values.
-
-    Attributes
-    ----------
-    kind
-        SECTION or CABLE.
-    rows
-        g and h of each sample, (2, ns).
-    pairs
-        Samples s <= t of each modulus, sorted by s, with all s = t, (2, nq).
-    products
-        Rows g <= h of the products in tangents, sorted, (2, np).
-    terms
-        Product, rows a and b of the samples (g first, then h), modulus, sorted, (4, nt).
-    of
-        Product of g and h of each sample, (ns,).
-    """
+    """What samples of strain depend on and what couples them, without values: rows g and h of each
+    sample, (2, ns), ``pairs`` of samples s <= t of each modulus, (2, nq), ``products`` of rows g <=
+    h in tangents, (2, np), and ``terms``: product, rows a and b of the samples (g first), modulus,
+    (4, nt). All are sorted; ``of`` is the product of g and h of each sample."""
 
     def __init__(self, kind: int, rows: Array, pairs: Array) -> None:
         self.kind, self.rows, self.pairs, self.ns = kind, rows, pairs, rows.shape[1]
