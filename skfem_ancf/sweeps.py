@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .core.errors import (CallError, CallbackError, InputError, Interrupted, MissingExtra,
-                           NameUnknown, PickleError, SweepWarning, require_function,
-                           require_integer, require_like, shown, warn)
+from .core.errors import (CallError, CallbackError, InputError, Interrupted, NameUnknown,
+                          PickleError, SweepWarning, require_function, require_integer,
+                          require_like, require_module, shown, warn)
 from .core.progress import progress_bar
 from .core.types import Array, ArrayLike
 
@@ -75,14 +75,10 @@ class Sweep:
 
         MissingExtra is raised if xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise MissingExtra("xarray", "arrays") from None
         values, parameters = (
             {name: (("member", *(f"{name}_{axis}" for axis in range(x.ndim - 1))), x)
              for name, x in arrays.items()} for arrays in (self.values, self.parameters))
-        return xarray.Dataset(values, parameters)
+        return require_module("xarray", "arrays").Dataset(values, parameters)
 
 
 def sweep(build: Callable[..., Any],

@@ -15,8 +15,8 @@ from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, S
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
-from ..core.errors import (InputError, MissingExtra, NameUnknown, ask, require_finite, require_flag,
-                           require_function, require_slope, shown)
+from ..core.errors import (InputError, NameUnknown, ask, require_finite, require_flag,
+                           require_function, require_module, require_slope, shown)
 from ..core.quadrature import gauss, product_rule
 from ..core.types import Array, Place, TimeFunction
 from .bound import at_generic_displacements
@@ -125,10 +125,7 @@ IMAGINARY, REAL = 1e-30, 1e-5
 @lru_cache(32)
 def by_jax(psi: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
     """A density in JAX and its derivatives."""
-    try:
-        import jax
-    except ImportError:
-        raise MissingExtra("jax", "autodiff") from None
+    jax = require_module("jax", "autodiff")
     from jax import experimental
     double = jax.enable_x64 if hasattr(jax, "enable_x64") else experimental.enable_x64
 

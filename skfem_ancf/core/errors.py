@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import importlib
 import os
 import pickle
 import re
@@ -108,6 +109,14 @@ class MissingExtra(AncfError, ImportError):
 
     def __reduce__(self):
         return type(self), (self.module, self.extra)
+
+
+def require_module(module: str, extra: str, package: str = "") -> Any:
+    """An optional module, of the package of that name or another one."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise MissingExtra(package or module.partition(".")[0], extra) from None
 
 
 class ConvergenceError(AncfError):

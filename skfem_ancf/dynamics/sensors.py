@@ -14,11 +14,10 @@ from ..beam.layout import WhichBeam
 from ..beam.points import Located
 from ..core.archive import output_file
 from ..core.errors import (CallbackError, CheckpointError, InputError, NameUnknown, ask_array,
-                           require_flag, require_path, shown)
+                           require_flag, require_module, require_path, shown)
 from ..core.immutable import Immutable
 from ..core.types import Array, StrPath
 from ..equations.system import System
-from ..io.tables import find_xarray
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
 from .base import Motion
@@ -163,7 +162,7 @@ class Readings(dict[str, "Array"]):
 
     def to_xarray(self) -> Any:
         """An ``xarray.Dataset`` with a variable for each sensor, along "time"."""
-        return find_xarray().Dataset(
+        return require_module("xarray", "arrays").Dataset(
             {name: (("time", *(f"{name}_{k}" for k in range(1, x.ndim))), x)
              for name, x in self.items()}, {"time": self.t})
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..beam.layout import select_member
-from ..core.errors import InputError, MissingExtra, shown
+from ..core.errors import InputError, require_module, shown
 from ..recovery.fields import find_fields, unit_of, units_of
 from ..recovery.grids import body_of, grids
 
@@ -56,7 +56,7 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
     >>> data.displacement.sel(component="y").values
     array([0., 0.])
     """
-    xarray, wanted = find_xarray(), find_fields(fields)
+    xarray, wanted = require_module("xarray", "arrays"), find_fields(fields)
     motion = hasattr(solution, "states")
     states = list(solution) if motion else [solution]
     if not states:
@@ -114,12 +114,3 @@ def _of_body(state, wanted, subdivide, recover, lenient, beam):
         table[field.name] = values if field.components == 1 else (
             values[:, PARTS[field.components][2]])
     return {"x": ("point", x[0]), "y": ("point", x[1]), "member": ("point", names)}, table
-
-
-def find_xarray() -> Any:
-    """The module xarray, or MissingExtra."""
-    try:
-        import xarray
-    except ImportError:
-        raise MissingExtra("xarray", "arrays") from None
-    return xarray

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import (FileError, InputError, MeshError, MissingExtra, require_finite,
+from ..core.errors import (FileError, InputError, MeshError, require_finite, require_module,
                            require_names, require_option, require_path, shown)
 from .frame_graph import FrameGraph
 
@@ -33,10 +33,7 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
     takes coordinates as drawn."""
     import meshio
 
-    try:
-        import ezdxf
-    except ImportError:
-        raise MissingExtra("ezdxf", "dxf") from None
+    ezdxf = require_module("ezdxf", "dxf")
     try:
         drawing = ezdxf.readfile(path)
         entities = list(drawing.modelspace())

@@ -492,6 +492,11 @@ def unit_of(field: Field, units: tuple[str, str] | None) -> str:
         field.unit, field.unit)
 
 
+def with_unit(text: str, unit: str) -> str:
+    """A text with a unit, which may be "" or "1" for none."""
+    return text if unit in ("", "1") else f"{text} ({unit})".strip()
+
+
 #: All fields by their names.
 FIELDS = {field.name: field for field in _table()}
 

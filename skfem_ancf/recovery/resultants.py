@@ -12,7 +12,7 @@ from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.remembered import cable_forces, remembers
 from ..beam.strains import cable_axis, on_grid, stress_at
-from ..core.errors import MissingExtra
+from ..core.errors import require_module
 from ..core.linear import angle_of, first_order, unwrapped
 from ..core.quadrature import gauss
 from ..core.types import Array
@@ -113,10 +113,7 @@ class Resultants:
         >>> state.resultants([(0.2, 0), (0.7, 0)]).to_dataframe().N.round(6).tolist()
         [2.0, 2.0]
         """
-        try:
-            import pandas
-        except ImportError:
-            raise MissingExtra("pandas", "arrays") from None
+        pandas = require_module("pandas", "arrays")
         shape, several = self.N.shape, np.ndim(self.s)
         axis = -1 - several
         columns = {"s": self.s, "x": self.x[0], "y": self.x[1]} | {

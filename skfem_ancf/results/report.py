@@ -7,6 +7,7 @@ import platform
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from ..core.types import Array, StrPath
 from ..recovery.fields import PRESSURES, units_of
 from ..visuals.diagrams import ROOM, lines_of
 from ..visuals.html import history_picture, picture
-from ..visuals.matplotlib import figure_class, plot_scene
+from ..visuals.matplotlib import new_axes, plot_scene
 from ..visuals.scenery import rounded, unit_of_resultant
 from ..visuals.symbols import symbols_of, unit_of_load
 from .checks import has_strength, materials_of
@@ -179,7 +180,7 @@ def supports_of(state: Any) -> Iterator[tuple[str, tuple[float, float, float]]]:
         except AncfError:
             continue
         member = layout.beam(item.beam)
-        place = (f"{_at(symbols[0].at[0])} of {'beam ' * isinstance(member, Beam)}"
+        place = (f"{_pair(symbols[0].at[0].start)} of {'beam ' * isinstance(member, Beam)}"
                  f"{name_of(system, member)}")
         if place not in known:
             known.add(place)
@@ -209,6 +210,8 @@ class _Page:
 
     def parts(self) -> list[str]:
         """All sections of the page."""
+        from importlib.metadata import version
+
         state = self.state
         how = ("linear, for small displacements" if state.base is not None else
                f"instant t = {state.t:g}{' of a motion' * bool(np.any(state._inertia))}"
@@ -223,13 +226,21 @@ class _Page:
             "<h2>Model</h2>", model, self._bodies(), self._materials(),
             "<h2>Loads and supports</h2>", self._actions(),
             "<h2>Reactions</h2>", self._reactions(),
-            "<h2>Results</h2>", self._extremes(), *self._pictures(), self._worst(),
+            "<h2>Results</h2>", self._extremes(), *(
+                _figure(partial(state.plot, field, scale="auto")) for field in (
+                    "displacement", "utilisation" if self.strong else "von_mises")),
+            _table(("utilisation", "at", "of"), [
+                ((f"{one.value:.3f}",), _pair(one.point), str(one.beam))
+                for one in state.extremes()]) if self.strong else "",
             "<h2>Section forces</h2>" if state.beams else "", self._section_forces(),
             *self._integrated(),
             "<h2>Findings</h2>", *([_text(text, "bad") for text in findings]
                                    or [_text("None: the solution is within the range of its mesh "
                                              "and materials.")]), *self._recovered(),
-            _text(self._versions(), "note")]
+            _text(f"skfem-ancf {version('skfem-ancf')}, scikit-fem {version('scikit-fem')}, NumPy "
+                  f"{np.__version__}, SciPy {version('scipy')}, Python "
+                  f"{platform.python_version()}. {self.system.N} degrees of freedom. "
+                  f"{date.today().isoformat()}", "note")]
 
     def _bodies(self):
         rows = []
@@ -272,7 +283,7 @@ class _Page:
                 continue
             way = f"direction ({a:.3g}, {b:.3g})" if s.kind in ("force", "weight") else ""
             if len(s.at) > 1:
-                place = f"from {_at(s.at[0])} to {_at(s.at[-1])}"
+                place = f"from {_pair(s.at[0].start)} to {_pair(s.at[-1].start)}"
             value = (rounded(s.value + 0.0, unit_of_load(s, self.units)),) if s.kind in (
                 "force", "moment", "weight", "mass") else ""
             rows.append(("distributed force" if s.per else s.kind, place,
@@ -335,18 +346,6 @@ class _Page:
                                  _pair(one.point), str(one.beam)))
         return _table(("", "value", "at", "of"), rows)
 
-    def _pictures(self):
-        yield _figure(lambda: self.state.plot("displacement", scale="auto"))
-        yield _figure(lambda: self.state.plot("utilisation" if self.strong else "von_mises",
-                                              scale="auto"))
-
-    def _worst(self):
-        if not self.strong:
-            return ""
-        return _table(("utilisation", "at", "of"), [
-            ((f"{one.value:.3f}",), _pair(one.point), str(one.beam))
-            for one in self.state.extremes()])
-
     def _section_forces(self):
         if not self.state.beams:
             return ""
@@ -366,8 +365,7 @@ class _Page:
         width, height = np.ptp(points, axis=1) + 2.0 * ROOM * np.max(np.ptp(points, axis=1))
         beside = height > width
         size = (7.0, 4.5) if beside else (6.3, min(9.5, 3.0 * (6.3 * height / width + 0.55)))
-        axes = figure_class()(figsize=size, layout="constrained").subplots(
-            *((1, 3) if beside else (3, 1)))
+        axes = new_axes(size, *((1, 3) if beside else (3, 1)))
         return _figure(lambda: self.state.plot_resultants(axes=axes, on="structure")[0], "tall"
                        ) + _table(("", "value", "at", "beam"), rows)
 
@@ -385,18 +383,7 @@ class _Page:
             if why:
                 yield _text(f"Stress of beam {name} is that of its elements: {why}.", "note")
 
-    def _versions(self):
-        from importlib.metadata import version
-
-        return (f"skfem-ancf {version('skfem-ancf')}, scikit-fem {version('scikit-fem')}, NumPy "
-                f"{np.__version__}, SciPy {version('scipy')}, Python {platform.python_version()}. "
-                f"{self.system.N} degrees of freedom. {date.today().isoformat()}")
-
 
 def _pair(x):
     x, y = np.round(x, ROUNDED) + 0.0
     return f"({x:.4g}, {y:.4g})"
-
-
-def _at(vector):
-    return _pair(vector.start)

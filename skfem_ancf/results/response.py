@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..core.errors import InputError, NameUnknown, NearMisses, require_index
 from ..core.types import Array, StrPath
-from ..visuals.bode import plot_bode, plot_nyquist
+from ..visuals.matplotlib import dress, new_axes, page
+from ..visuals.scenery import MUTED
 
 
 @dataclass(repr=False)
@@ -93,11 +94,30 @@ class FrequencyResponse(NearMisses):
         ----------
         output, input
             Names or numbers.
-        axes, label, title, filename, dpi
-            As for :func:`skfem_ancf.visuals.bode.plot_bode`.
+        axes
+            Two matplotlib Axes to draw on; a new figure by default, which needs no display.
+        label
+            For a legend.
+        title, filename, dpi
+            As for :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
         """
-        return plot_bode(self.frequencies, self.of(output, input), axes, label=label, title=title,
-                         filename=filename, dpi=dpi)
+        save, values = page(None, title, filename, dpi), self.of(output, input)
+        from matplotlib.ticker import MultipleLocator
+
+        if axes is None:
+            axes = new_axes((6.0, 4.4), 2, 1, sharex=True, height_ratios=(2, 1))
+        if np.shape(axes) != (2,):
+            raise InputError("axes must be two matplotlib Axes, as plot() returns them")
+        positive = self.frequencies > 0.0
+        w, values = self.frequencies[positive], values[positive]
+        axes[0].loglog(w, np.abs(values), lw=1.4, label=label)
+        axes[1].semilogx(w, np.degrees(np.unwrap(np.angle(values))), lw=1.4, label=label)
+        axes[1].yaxis.set_major_locator(MultipleLocator(90.0))
+        for ax in axes:
+            ax.grid(True, which="major", lw=0.4, color=MUTED, alpha=0.4)
+        dress(axes[1], None, "angular frequency (rad/s)", "phase (degrees)")
+        _finish(axes[0], label, title, "", "amplitude", save)
+        return axes
 
     def plot_nyquist(self, output: int | str = 0, input: int | str = 0, ax: Any = None, *,
                      label: str | None = None, title: str | None = None,
@@ -109,10 +129,23 @@ class FrequencyResponse(NearMisses):
         output, input
             Names or numbers.
         ax, label, title, filename, dpi
-            As for :func:`skfem_ancf.visuals.bode.plot_nyquist`.
+            As for :meth:`plot`; one Axes.
         """
-        return plot_nyquist(self.of(output, input), ax, label=label, title=title,
-                            filename=filename, dpi=dpi)
+        save, values = page(None, title, filename, dpi), self.of(output, input)
+        ax = new_axes((5.0, 4.4)) if ax is None else ax
+        ax.plot(values.real, values.imag, lw=1.4, label=label)
+        ax.axhline(0.0, color=MUTED, lw=0.6)
+        ax.axvline(0.0, color=MUTED, lw=0.6)
+        ax.set_aspect("equal", adjustable="datalim")
+        _finish(ax, label, title, "real part", "imaginary part", save)
+        return ax
+
+
+def _finish(ax, label, title, xlabel, ylabel, save):
+    if label is not None:
+        ax.legend(fontsize=8, frameon=False)
+    dress(ax, title, xlabel, ylabel)
+    save(ax)
 
 
 def _number(kind, which, names):

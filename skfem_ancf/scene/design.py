@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..actions.bound import derivative
-from ..core.errors import (ConvergenceError, InputError, MissingExtra, NameUnknown, ask, ask_array,
-                           require_finite, require_function, shown)
+from ..core.errors import (ConvergenceError, InputError, NameUnknown, ask, ask_array,
+                           require_finite, require_function, require_module, shown)
 from ..core.band import NO_FACTORS
 from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
@@ -152,11 +152,7 @@ class Design:
         p
             Parameters for which there is a solution: they show the number of readings.
         """
-        try:
-            import jax
-        except ImportError:
-            raise MissingExtra("jax", "autodiff") from None
-        rows = len(self.values(p))
+        jax, rows = require_module("jax", "autodiff"), len(self.values(p))
 
         def called(function, shape, p):
             return jax.pure_callback(lambda p: function(np.asarray(p, dtype=float)).astype(p.dtype),

@@ -232,72 +232,73 @@ class LinearModel:
         return Bordered((K, D, self._mass()), J, self._system.constraints, self.prescribed)
 
 
+class Factors(NamedTuple):
+    """LU factors of a scaled matrix, of the unknowns that are kept."""
+
+    lu: Any
+    left: Array
+    right: Array
+    keep: Array
+
+    @classmethod
+    def of(cls, rows: Any, left: Array, right: Array, keep: Array) -> Factors:
+        """Those of a matrix of blocks, scaled from both sides."""
+        A = sparse.diags_array(left) @ sparse.block_array(rows, format="csr") @ (
+            sparse.diags_array(right))
+        return cls(splu(sparse.csc_array(A[keep][:, keep])), left, right, keep)
+
+    def solve(self, b: Array, trans: str = "N") -> Array:
+        """The solution for b (k,) or (k, n); zero where it is not kept."""
+        before, after = (self.left, self.right) if trans == "N" else (self.right, self.left)
+        b = (b.T * before).T[self.keep]
+        x = (self.lu.solve(b, trans).T * after[self.keep]).T
+        out = np.zeros((len(self.keep), *b.shape[1:]), x.dtype)
+        out[self.keep] = x
+        return out
+
+
 class Bordered:
-    """Solutions with sums of matrices such as K, D and M, with joints and supports. The sums have
-    one sparsity pattern. ``prescribed`` are displacements of fixed degrees of freedom, (N, k)."""
+    """Solutions with sums of matrices such as K, D and M, with joints and supports.
+
+    ``prescribed`` are displacements of fixed degrees of freedom, (N, k).
+    """
 
     def __init__(self, matrices: Sequence[Any], J: Any, constraints: Any,
                  prescribed: Array) -> None:
         self._free, self._prescribed, self._J = constraints.free, prescribed, J
-        self._matrices = matrices
-        s = self._sizes = constraints.coordinate_sizes
-        S, free = sparse.diags_array(s[self._free]), self._free
-        parts = [sparse.csc_array(S @ A[free][:, free] @ S) for A in matrices]
+        self._matrices, m = matrices, J.shape[0]
+        self._keep = np.append(self._free, np.ones(m, bool))
         # rows of joints by the size of the stiffness: pivots of one size
-        self._scale = float(np.abs(parts[0].diagonal()).max())
-        rows = self._scale * sparse.csc_array(J)[:, free] @ S
-        m, n = rows.shape
-        joints = sparse.block_array([[sparse.csc_array((n, n)), rows.T], [rows, None]],
-                                    format="csc") if m else sparse.csc_array((n, n))
-        for A in parts:
-            A.resize((n + m, n + m))
-        self._pattern = sparse.csc_array(sum((abs(A) for A in parts), abs(joints)))
-        self._pattern.sort_indices()
-        places = _places(self._pattern)
-        self._values = np.zeros((len(parts) + 1, self._pattern.nnz))
-        for row, A in zip(self._values, (*parts, joints)):
-            A.sum_duplicates()
-            row[np.searchsorted(places, _places(A))] = A.data
-        self._right = [A @ prescribed for A in matrices]
+        s = constraints.coordinate_sizes
+        scale = np.abs(matrices[0].diagonal() * s**2)[self._free].max()
+        self._sizes = np.append(s, np.full(m, scale))
 
     def solve(self, factors: Sequence[complex], B: Array, G: Array) -> tuple[Array, Array]:
         """Displacements (N, k) and multipliers (m, k) for forces B and right-hand sides G."""
-        free, (sizes, lu) = self._free, self._factors(factors)
-        force = B - sum(c * x for c, x in zip(factors, self._right))
-        right = np.concatenate([force[free], G - self._J @ self._prescribed])
-        x = sizes * lu.solve((sizes * right).astype(np.result_type(*factors, float)))
-        u, n = self._prescribed.astype(x.dtype), int(free.sum())
-        u[free] = x[:n]
-        return u, x[n:]
+        K, solver = self._factors(factors)
+        x = solver.solve(np.concatenate([B - K @ self._prescribed, G - self._J @ self._prescribed]))
+        u, multipliers = np.split(x, [len(self._free)])
+        return np.where(self._free[:, None], u, self._prescribed), multipliers
 
     def adjoint(self, factors: Sequence[float], by: Array) -> Array:
-        """The adjoint (N + m, r) of readings with derivatives ``by`` (N + m, r). At fixed degrees
-        of freedom the equation is that of the prescribed displacement."""
-        (sizes, lu), N = self._factors(factors), len(self._free)
-        out, free = by.copy(), np.append(self._free, np.ones(len(by) - N, bool))
-        found = np.zeros_like(by)
-        found[free] = sizes * lu.solve(sizes * by[free], "T")
-        out[free] = found[free]
-        K = sum(c * A for c, A in zip(factors, self._matrices))
-        out[~free] -= (K.T @ found[:N] + self._J.T @ found[N:])[~self._free]
-        return out
+        """The adjoint (N + m, r) of readings with derivatives ``by`` (N + m, r).
+
+        At fixed degrees of freedom the equation is that of the prescribed displacement.
+        """
+        K, solver = self._factors(factors)
+        found, N, fixed = solver.solve(by, "T"), len(self._free), ~self._keep
+        found[fixed] = (by[:N] - K.T @ found[:N] - self._J.T @ found[N:])[~self._free]
+        return found
 
     def _factors(self, factors):
-        """Sizes of the free unknowns, (n + m, 1), and LU factors of the scaled matrix."""
-        A = self._pattern.astype(np.result_type(*factors, float))
-        A.data = np.array([*factors, 1.0]) @ self._values
-        s = self._sizes[self._free]
-        sizes = np.append(s, np.full(A.shape[0] - len(s), self._scale))[:, None]
+        """The sum of the matrices, and its Factors with the joints."""
+        K = sum(c * A for c, A in zip(factors, self._matrices))
         try:
-            return sizes, splu(A)
+            return K, Factors.of([[K, self._J.T], [self._J, None]], self._sizes, self._sizes,
+                                 self._keep)
         except RuntimeError:
             raise SupportError("the dynamic stiffness is singular: this is the frequency of an "
                                "undamped mode") from None
-
-
-def _places(A):
-    """Positions of the entries of a CSC matrix in its columns one below the other."""
-    return np.repeat(np.arange(A.shape[1]), np.diff(A.indptr)) * A.shape[0] + A.indices
 
 
 def _labels(name, n):

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.sparse.linalg import lsqr, splu
+from scipy.sparse.linalg import lsqr
 
 from ..actions.bound import BoundConstraint, BoundForce, derivative
 from ..actions.loads import Unscaled
@@ -28,7 +28,7 @@ from ..dynamics.sensors import locate, read
 from ..equations.matrices import matrices_of
 from .design import STENCIL, Design, Differences
 from .eigen_readings import residual
-from .linear_model import rows_of
+from .linear_model import Factors, rows_of
 from .parameters import Parameters
 
 #: Step of the parameters, relative to their size: what it moves of the motion must be small.
@@ -359,22 +359,17 @@ class _Step:
         slope, bend = (late - early) / (2.0 * s), (late - 2.0 * J + early) / s**2
         none = [None, None]
         if self._raw is not None:
-            rows = [[K + to_v * D + to_a * M, J.T, *none, *none],
-                    [turned[0] - to_v * M, None, M, J.T, *none],
-                    [turned[1] - to_a * M, None, *none, M, J.T]]
+            first, second, third = K + to_v * D + to_a * M, turned[0] - to_v * M, [
+                turned[1] - to_a * M, None, *none]
             joints = J
         else:
             first, joints = (M, J) if design.state is None else matrices_of(
                 system, design.state)[2::2]
-            rows = [[first, joints.T, *none, *none], [turned[0], None, M, J.T, *none],
-                    [K, None, D, None, M, J.T]]
-        if c.m:
-            zero = sparse.csr_array((c.m, c.m))
-            rows = [rows[0], [joints, zero, *none, *none], rows[1], [slope, None, J, None, *none],
-                    rows[2], [bend, None, 2.0 * slope, None, J, None]]
-        else:
-            rows = [row[::2] for row in rows]
-        return _factors(rows, K + M / h**2, c, h)
+            second, third = turned[0], [K, None, D, None]
+        return _factors([
+            [first, joints.T, *none, *none], [joints, *none, *none, None],
+            [second, None, M, J.T, *none], [slope, None, J, None, *none],
+            [*third, M, J.T], [bend, None, 2.0 * slope, None, J, None]], K + M / h**2, c, h)
 
     def forward(self, change: Array, old: Any) -> dict[str, Array]:
         """Derivatives (..., n) by name, from those of the equations and of the instant before."""
@@ -475,17 +470,12 @@ class _MeanStep(_Step):
         self._by = sparse.block_array([
             [early + turned - 2.0 / h**2 * M, 0.25 * kick - 2.0 / h * M],
             [0.5 * kick + 2.0 / h * M, M]], format="csr")
-        rows = [[A, self._J.T, 0.25 * kick, by_impulse.T],
-                [0.5 * kick - 2.0 / h * M, None, M, self._J.T]]
-        if c.m:
-            J = c.sparse_jacobian(y.u, y.t)
-            slope = (c.sparse_jacobian(y.u + s * y.v, y.t + s)
-                     - c.sparse_jacobian(y.u - s * y.v, y.t - s)) / (2.0 * s)
-            zero = sparse.csr_array((c.m, c.m))
-            rows = [rows[0], [J, zero, None, None], rows[1], [slope, None, J, None]]
-        else:
-            rows = [row[::2] for row in rows]
-        return _factors(rows, A, c, h)
+        J = c.sparse_jacobian(y.u, y.t)
+        slope = (c.sparse_jacobian(y.u + s * y.v, y.t + s)
+                 - c.sparse_jacobian(y.u - s * y.v, y.t - s)) / (2.0 * s)
+        return _factors([
+            [A, self._J.T, 0.25 * kick, by_impulse.T], [J, None, None, None],
+            [0.5 * kick - 2.0 / h * M, None, M, self._J.T], [slope, None, J, None]], A, c, h)
 
     def forward(self, change: Array, old: Any) -> dict[str, Array]:
         c, h, ahead = self._system.constraints, self._h, self._ahead
@@ -510,37 +500,17 @@ class _MeanStep(_Step):
                        "algorithmic": -ahead * bars["acceleration"], "force": -ahead * pull}
 
 
-class _Factors(NamedTuple):
-    """LU factors of a scaled matrix, of the unknowns that are kept."""
-
-    lu: Any
-    left: Array
-    right: Array
-    keep: Array
-
-    def solve(self, b: Array, trans: str = "N") -> Array:
-        """The solution for b (k,) or (k, n); zero where fixed."""
-        before, after = (self.left, self.right) if trans == "N" else (self.right, self.left)
-        out = np.zeros_like(b)
-        b = (b.T * before).T[self.keep]
-        out[self.keep] = (self.lu.solve(b, trans).T * after[self.keep]).T
-        return out
-
-
 def _factors(rows, K, c, h):
     """The factors of equations and unknowns in blocks u, l; v, impulses; a, forces, or the first.
-    They are scaled by the sizes of coordinates, a stiffness K and the time h."""
-    sizes, one = c.coordinate_sizes, np.ones(c.m)
-    scale = float(np.abs(K.diagonal() * sizes**2)[c.free].max())
-    n = 2 * len(rows) // (2 if c.m else 1)
-    left = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes,
-                           scale * h * h * one][:n])
-    right = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes / h**2,
-                            scale * one][:n])
-    keep = np.tile(np.append(c.free, np.ones(c.m, bool)), n // 2)
-    A = sparse.diags_array(left) @ sparse.block_array(rows, format="csr") @ (
-        sparse.diags_array(right))
-    return _Factors(splu(sparse.csc_array(A[keep][:, keep])), left, right, keep)
+
+    They are scaled by the sizes of coordinates, a stiffness K and the time h.
+    """
+    sizes, n = c.coordinate_sizes, len(rows)
+    scale = np.full(c.m, np.abs(K.diagonal() * sizes**2)[c.free].max())
+    both = [sizes, scale, sizes / h]
+    left = np.concatenate([*both, scale * h, sizes, scale * h * h][:n])
+    right = np.concatenate([*both, scale * h, sizes / h**2, scale][:n])
+    return Factors.of(rows, left, right, np.tile(np.append(c.free, np.ones(c.m, bool)), n // 2))
 
 
 def _turning(design, y):

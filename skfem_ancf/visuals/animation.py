@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..core.archive import output_file
-from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
-                           require_like, require_path, require_positive, require_text, shown)
+from ..core.errors import (InputError, require_flag, require_integer, require_like, require_module,
+                           require_path, require_positive, require_text, shown)
 from ..core.types import StrPath
 from .matplotlib import FLAT, colormap, colour_bar, dress, figure_class, paint
 from .scenery import INK, MUTED, Scenery
@@ -54,19 +54,32 @@ def animate(history: Any, filename: StrPath, field: Any = None, *,
         Magnification of displacements, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     """
     require_like("history", history, "History", "states", "t")
-    path, undeformed = _file(filename), require_flag("undeformed", undeformed)
-    chosen = _chosen(history, frames)
+    path, undeformed = require_path("filename", filename, SUFFIXES), require_flag(
+        "undeformed", undeformed)
+    film = path.suffix.lower() == ".mp4"
+    for module in ("imageio", "imageio_ffmpeg") if film else ():
+        require_module(module, "view")
+    if not (n := len(history.t)):
+        raise InputError("the history has no instants")
+    frames = FRAMES if frames is None else require_integer("frames", frames, 1)
+    chosen = np.unique(np.round(np.linspace(0, n - 1, min(frames, n))).astype(int))
     figure_class()
     cmap, unit = colormap(cmap), require_text("unit", unit)
-    fps, size = _fps(history, chosen, fps), size if size is None else pixels("size", size)
+    t = history.t[chosen]
+    if fps is None:
+        span = float(t[-1] - t[0])
+        fps = float(np.clip((len(t) - 1) / span, 5.0, 50.0)) if span > 0 else 5.0
+    elif not FPS[0] <= require_positive("fps", fps) <= FPS[1]:
+        raise InputError(f"fps must lie between {FPS[0]} and {FPS[1]}, got {fps!r}")
+    size = size if size is None else pixels("size", size)
     scenery = Scenery(list(history.states(chosen)), field, thickness, undeformed, limits,
                       subdivide, recover, scale)
-    images = _frames(scenery, history.t[chosen], size, cmap, unit)
+    images = _frames(scenery, t, size, cmap, unit)
     with output_file(path) as temporary:
-        if path.suffix.lower() == ".gif":
-            _gif(temporary, images, fps, _colours(scenery, cmap))
-        else:
+        if film:
             _mp4(temporary, images, fps)
+        else:
+            _gif(temporary, images, fps, scenery.colours(cmap))
     return path
 
 
@@ -78,39 +91,6 @@ def pixels(name: str, size: Any) -> tuple[int, int]:
         raise InputError(f"{name} must be two integers from {PIXELS[0]} to {PIXELS[1]}, the width "
                          f"and height in pixels, got {shown(size)}") from None
     return width, height
-
-
-def _file(filename):
-    path = require_path("filename", filename, SUFFIXES)
-    if path.suffix.lower() == ".mp4":
-        for module in ("imageio", "imageio_ffmpeg"):
-            try:
-                __import__(module)
-            except ImportError:
-                raise MissingExtra(module, "view") from None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"cannot make the folder {str(path.parent)!r}: {error}") from error
-    return path
-
-
-def _chosen(history, frames):
-    n = len(history.t)
-    if n == 0:
-        raise InputError("the history has no instants")
-    frames = min(n, FRAMES) if frames is None else require_integer("frames", frames, 1)
-    return np.unique(np.round(np.linspace(0, n - 1, min(frames, n))).astype(int))
-
-
-def _fps(history, chosen, fps):
-    if fps is not None:
-        fps = require_positive("fps", fps)
-        if not FPS[0] <= fps <= FPS[1]:
-            raise InputError(f"fps must lie between {FPS[0]} and {FPS[1]}, got {fps!r}")
-        return fps
-    span = float(history.t[chosen[-1]] - history.t[chosen[0]])
-    return float(np.clip((len(chosen) - 1) / span, 5.0, 50.0)) if span > 0 else 5.0
 
 
 def _frames(scenery: Scenery, t: Any, size: Any, cmap: Any, unit: str | None) -> Iterator[Any]:
@@ -126,7 +106,7 @@ def _frames(scenery: Scenery, t: Any, size: Any, cmap: Any, unit: str | None) ->
     canvas, ax, field = FigureCanvasAgg(figure), figure.add_subplot(), scenery.field
     margin = 0.04 * max(x1 - x0, y1 - y0)
     ax.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), aspect="equal")
-    dress(ax, None, "", scenery.length)
+    dress(ax, None, *scenery.axes)
     image, artists = paint(ax, scenery, [0], cmap)
     if image is not None:
         colour_bar(ax, image, "neither", scenery.label(field.symbol, unit))
@@ -143,27 +123,20 @@ def _frames(scenery: Scenery, t: Any, size: Any, cmap: Any, unit: str | None) ->
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _gif(path, images, fps, colours):
-    try:
-        from PIL import Image
-    except ImportError:
-        raise MissingExtra("pillow", "plot") from None
+def _gif(path, images, fps, cmap):
+    """Write with 256 colours: those of the colour map, and greys."""
+    from matplotlib import colormaps
+
+    Image = require_module("PIL.Image", "plot", "pillow")
+    shades = (colormaps[cmap] if isinstance(cmap, str) else cmap)(np.linspace(0, 1, 216))
+    greys = np.repeat(np.linspace(0, 1, 40)[:, None], 3, axis=1)
     palette = Image.new("P", (1, 1))
-    palette.putpalette(colours)
+    palette.putpalette(np.round(255 * np.concatenate([shades[:, :3], greys])).astype(
+        np.uint8).tobytes())
     frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE)
               for image in images]
     frames[0].save(path, format="GIF", save_all=True, append_images=frames[1:], loop=0,
                    duration=round(1000 / fps))
-
-
-def _colours(scenery, cmap):
-    """256 colours as bytes: those of the colour map, and greys."""
-    from matplotlib import colormaps
-
-    cmap = scenery.colours(cmap)
-    shades = (colormaps[cmap] if isinstance(cmap, str) else cmap)(np.linspace(0, 1, 216))
-    greys = np.repeat(np.linspace(0, 1, 40)[:, None], 3, axis=1)
-    return np.round(255 * np.concatenate([shades[:, :3], greys])).astype(np.uint8).tobytes()
 
 
 def _mp4(path, images, fps):

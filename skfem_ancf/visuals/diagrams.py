@@ -9,9 +9,9 @@ import numpy as np
 from ..beam.layout import WhichBeam, select_beam
 from ..core.errors import InputError, require_flag, require_like, require_option
 from ..core.types import Array, StrPath
-from ..recovery.fields import units_of
+from ..recovery.fields import units_of, with_unit
 from ..recovery.grids import grids
-from .matplotlib import dress, figure_class, page, plain, save
+from .matplotlib import dress, new_axes, page
 from .scenery import GHOST, INK, MUTED, rounded, unit_of_resultant
 from .symbols import Sketch, symbols_of
 
@@ -70,12 +70,11 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
     >>> [text.get_text() for text in state.plot_resultants()[2].texts]
     ['2']
     """
-    Figure = figure_class()
+    save = page(None, title, filename, dpi, bbox_inches="tight")
     require_like("state", state, "State", "beams", "resultants")
     recover = require_flag("recover", recover)
     require_option("on", on, ("auto", "structure", "length"))
     beams = list(state.beams) if beam is None else [select_beam(state.beams, beam)]
-    filename, dpi = page(None, title, filename, dpi)
     if not beams:
         raise InputError("section forces are those of beams, and this scene has none: see its "
                          'stress by state.plot("von_mises") and state.extremes("von_mises")')
@@ -83,7 +82,7 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
         frame = getattr(state.system.constraints, "frame", None)
         on = "length" if frame is None and len(beams) == 1 else "structure"
     if axes is None:
-        axes = _figure(Figure, beams, on)
+        axes = _new_axes(beams, on)
     axes = [axes] if not isinstance(axes, (list, tuple, np.ndarray)) else list(
         np.array(axes, dtype=object).ravel())
     if len(axes) != 3:
@@ -95,20 +94,20 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
         axes[0].figure.suptitle(title, fontsize=11, color=INK)
     elif title:
         axes[0].set_title(title, loc="left", fontsize=10, color=INK)
-    save(axes[0], filename, dpi=dpi, bbox_inches="tight")
+    save(axes[0])
     return axes
 
 
-def _figure(Figure, beams, on):
+def _new_axes(beams, on):
     """Three axes: below each other, on a high structure beside each other."""
     if on == "length":
-        return Figure(figsize=(6.0, 5.4), layout="constrained").subplots(3, 1, sharex=True)
+        return new_axes((6.0, 5.4), 3, 1, sharex=True)
     (width, height), size = (box := np.ptp(np.hstack([b.mesh.p for b in beams]), axis=1)), max(box)
     aspect = (height + 2.0 * ROOM * size) / (width + 2.0 * ROOM * size)
     if aspect < 0.45:
-        return Figure(figsize=(7.0, 21.0 * aspect + 2.0), layout="constrained").subplots(3, 1)
+        return new_axes((7.0, 21.0 * aspect + 2.0), 3, 1)
     w = min(4.2, 6.0 / aspect)
-    return Figure(figsize=(3.0 * w, w * aspect + 1.1), layout="constrained").subplots(1, 3)
+    return new_axes((3.0 * w, w * aspect + 1.1), 1, 3)
 
 
 def _over_length(axes, state, beams, recover):
@@ -123,15 +122,12 @@ def _over_length(axes, state, beams, recover):
     units = units_of(state)
     for ax, (name, label) in zip(axes, _ROWS):
         ax.axhline(0.0, color=MUTED, lw=0.6)
-        ax.set_ylabel(label + (f" ({unit_of_resultant(name, units)})" if units else ""),
-                      fontsize=9, color=INK)
+        dress(ax, None, with_unit("arc length $s$", units[1] if units else "") * (ax is axes[2]),
+              with_unit(label, unit_of_resultant(name, units)))
         ax.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
         size = max(map(abs, ax.get_ylim()))
         if size < 1e-9 * max(max(map(abs, other.get_ylim())) for other in ax.figure.axes):
             ax.set_ylim(-1.0, 1.0)  # round-off about zero is not to be seen
-        plain(ax)
-    axes[2].set_xlabel("arc length $s$" + (f" ({units[1]})" if units else ""), fontsize=9,
-                       color=INK)
     if several:
         axes[0].legend(fontsize=8, frameon=False)
 
@@ -179,9 +175,8 @@ def _on_structure(axes, state, beams, recover):
                    unit_of_resultant(name, units))
         (x0, y0), (x1, y1) = low - ROOM * size, high + ROOM * size
         ax.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1), yticks=[])
-        dress(ax, label + (" = 0" if not scale else ""))
+        dress(ax, label + " = 0" * (not scale), with_unit("x", units[1] if units else ""), "")
         ax.spines["left"].set_visible(False)
-        ax.set(xlabel="x" + (f" ({units[1]})" if units else ""), ylabel="")
     axes[-1].figure.text(0.99, 0.0, NOTE, va="top", ha="right", fontsize=7, color=MUTED, gid="note")
 
 

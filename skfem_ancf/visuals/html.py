@@ -69,12 +69,11 @@ def history_html(history: Any) -> str:
 
 def history_picture(history: Any) -> Any:
     """Axes with the energies of a History over time."""
-    from .matplotlib import dress, figure_class
+    from .matplotlib import dress, new_axes
 
-    ax = figure_class()(figsize=(5.5, 3.0), layout="constrained").subplots()
+    ax = new_axes((5.5, 3.0))
     for name in ("strain", "kinetic", "potential", "total"):
         ax.plot(history.t, getattr(history, f"{name}_energy"), lw=1.4, label=name)
     ax.legend(fontsize=8, frameon=False)
-    dress(ax, "energy")
-    ax.set(xlabel="time", ylabel="")
+    dress(ax, "energy", "time", "")
     return ax

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..actions.obstacles.contact import touching
 from ..actions.obstacles.outlines import AROUND, around
 from ..beam.layout import WhichBeam
 from ..core.archive import output_file
-from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
+from ..core.errors import (InputError, require_flag, require_integer, require_like, require_module,
                            require_option, require_path, require_positive, require_text)
 from ..core.types import StrPath
 from ..recovery.fields import FIELDS, unit_of, units_of
@@ -102,19 +102,16 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
     >>> state.plot("S_xx").get_title(loc="left")
     'second Piola–Kirchhoff stress $S_{xx}$, beam frame'
     """
-    Figure, states, cmap = figure_class(), _states(state), colormap(cmap)
-    colorbar, unit = require_flag("colorbar", colorbar), require_text("unit", unit)
-    filename, dpi = page(ax, title, filename, dpi)
-    loads, supports = require_flag("loads", loads), require_flag("supports", supports)
-    fade, contact = require_flag("fade", fade), require_flag("contact", contact)
+    save = page(ax, title, filename, dpi, bbox_inches="tight")
+    states, cmap, unit = _states(state), colormap(cmap), require_text("unit", unit)
+    _require_flags(colorbar=colorbar, loads=loads, supports=supports, fade=fade, contact=contact)
     symbols = symbols_of(states[-1], loads, supports)
     scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover, scale)
     drawn, values = scenery.field, scenery.found
     if symbols:
         scenery.margin = WIDE
     if ax is None:
-        ax = Figure(figsize=_figsize(scenery.every[:, :2], colorbar),
-                    layout="constrained").add_subplot()
+        ax = new_axes(_figsize(scenery.every[:, :2], colorbar))
     _ = scenery.every  # with the reference configuration, which is drawn once
     parts = [[k] for k in range(len(states))] if fade else [range(len(states))]
     for k, part in enumerate(parts, 1):
@@ -127,11 +124,11 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
     if contact:
         _draw_contact(ax, scenery, states[-1])
     frame(ax, scenery, bool(symbols))
-    dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note, scenery.length)
+    dress(ax, (drawn.title or drawn.name) if title is None else title, *scenery.axes, scenery.note)
     if colorbar and image is not None:
         ends = bool(np.any(values < scenery.low)), bool(np.any(values > scenery.high))
         colour_bar(ax, image, _EXTEND[ends], scenery.label(drawn.symbol, unit))
-    save(ax, filename, dpi=dpi, bbox_inches="tight")
+    save(ax)
     return ax
 
 
@@ -186,16 +183,13 @@ def plot_scene(scene: Any, ax: Any = None, *, loads: bool = True, supports: bool
     ax, thickness, title, filename, dpi
         As for :func:`plot_state`.
     """
-    Figure = figure_class()
-    loads, supports, nodes, names = (require_flag(name, value) for name, value in (
-        ("loads", loads), ("supports", supports), ("nodes", nodes), ("names", names)))
-    filename, dpi = page(ax, title, filename, dpi)
+    save = page(ax, title, filename, dpi, bbox_inches="tight")
+    _require_flags(loads=loads, supports=supports, nodes=nodes, names=names)
     state = scene.state(load=0.0) if hasattr(scene, "state") else scene
     scenery = Scenery([state], "displacement", thickness, True, None, (8, 2), False)
     scenery.margin, inside = WIDE, ax is not None
     if ax is None:
-        ax = Figure(figsize=_figsize(scenery.every[:, :2], bool(_laws(state.beams))),
-                    layout="constrained").add_subplot()
+        ax = new_axes(_figsize(scenery.every[:, :2], bool(_laws(state.beams))))
     paint(ax, scenery, [0], None, BODIES[0])
     _materials(ax, scenery, state.beams, (8, 2), inside)
     drawn = sketch(ax, scenery, state)
@@ -206,8 +200,8 @@ def plot_scene(scene: Any, ax: Any = None, *, loads: bool = True, supports: bool
     if names:
         drawn.names(scenery.names)
     frame(ax, scenery, True)
-    dress(ax, title, scenery.note, scenery.length)
-    save(ax, filename, dpi=dpi, bbox_inches="tight")
+    dress(ax, title, *scenery.axes, scenery.note)
+    save(ax)
     return ax
 
 
@@ -349,11 +343,8 @@ def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam =
     ax, title, filename, dpi
         As for :func:`plot_state`.
     """
-    Figure = figure_class()
-    component = require_integer("component", component, 0, 1)
-    filename, dpi = page(ax, title, filename, dpi)
-    if ax is None:
-        ax = Figure(figsize=(5.5, 4.0), layout="constrained").subplots()
+    save, component = page(ax, title, filename, dpi), require_integer("component", component, 0, 1)
+    ax = new_axes((5.5, 4.0)) if ax is None else ax
     u, load = path.displacement(point, beam)[:, component], path.load
     color = ax.plot([], [])[0].get_color()
     for k in range(len(u) - 1):  # a piece is drawn as its end is
@@ -361,10 +352,8 @@ def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam =
         ax.plot(u[k:k + 2], load[k:k + 2], color=color, lw=1.6, ls=(0, (3, 2)) if dashed else "-")
     turns = np.nonzero(np.diff(np.sign(np.diff(load))))[0] + 1
     ax.plot(u[turns], load[turns], "o", ms=4, color=color)
-    dress(ax, title)
-    ax.set_xlabel(f"displacement $u_{'xy'[component]}$", fontsize=9, color=INK)
-    ax.set_ylabel("load factor", fontsize=9, color=INK)
-    save(ax, filename, dpi=dpi)
+    dress(ax, title, f"displacement $u_{'xy'[component]}$", "load factor")
+    save(ax)
     return ax
 
 
@@ -384,30 +373,26 @@ def plot_curve(x: ArrayLike, y: ArrayLike, ax: Any = None, *, xlabel: str = "", 
     **options
         Of matplotlib's ``Axes.plot``.
     """
-    Figure = figure_class()
-    x, y = np.asarray(x), np.asarray(y)
+    save, x, y = page(ax, title, filename, dpi), np.asarray(x), np.asarray(y)
     if x.shape != y.shape:
         raise InputError(f"x and y of a curve are at the same instants, got {x.shape} and "
                          f"{y.shape} numbers: sensors read all steps, arrays of the history its "
                          "stored instants")
-    filename, dpi = page(ax, title, filename, dpi)
-    if ax is None:
-        ax = Figure(figsize=(5.5, 4.0), layout="constrained").subplots()
+    ax = new_axes((5.5, 4.0)) if ax is None else ax
     ax.plot(x, y, **{"lw": 1.6, **options})
-    dress(ax, title)
-    ax.set_xlabel(xlabel, fontsize=9, color=INK)
-    ax.set_ylabel(ylabel, fontsize=9, color=INK)
-    save(ax, filename, dpi=dpi)
+    dress(ax, title, xlabel, ylabel)
+    save(ax)
     return ax
 
 
 def figure_class() -> Any:
     """matplotlib's Figure, which needs no display."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
-    return Figure
+    return require_module("matplotlib.figure", "plot").Figure
+
+
+def new_axes(size: tuple[float, float], *shape: int, **options: Any) -> Any:
+    """The Axes of a new figure; several for a number of rows and columns."""
+    return figure_class()(figsize=size, layout="constrained").subplots(*shape, **options)
 
 
 def colormap(cmap: Any) -> Any:
@@ -420,8 +405,12 @@ def colormap(cmap: Any) -> Any:
     return require_option("colour map", cmap, tuple(colormaps))
 
 
-def page(ax: Any, title: str | None, filename: Any, dpi: float) -> tuple[Any, float]:
-    """Check the file, or None, and its resolution, before anything is drawn."""
+def page(ax: Any, title: str | None, filename: Any, dpi: float, **options: Any,
+         ) -> Callable[[Any], None]:
+    """Check the file, or None, and its resolution, before anything is drawn; returns what writes
+    the figure of some Axes.
+    """
+    figure_class()
     from matplotlib.backend_bases import FigureCanvasBase
 
     if ax is not None:
@@ -433,32 +422,29 @@ def page(ax: Any, title: str | None, filename: Any, dpi: float) -> tuple[Any, fl
     if filename is not None:
         known = sorted(FigureCanvasBase.get_supported_filetypes())
         filename = require_path("filename", filename, [f".{kind}" for kind in known])
-    return filename, dpi
+
+    def save(ax: Any) -> None:
+        if filename is not None:
+            with output_file(filename) as temporary:
+                ax.figure.savefig(temporary, dpi=dpi, **options)
+
+    return save
 
 
-def save(ax: Any, filename: Any, **options: Any) -> None:
-    """Write the figure of some Axes; None for no file."""
-    if filename is not None:
-        with output_file(filename) as temporary:
-            ax.figure.savefig(temporary, **options)
+def _require_flags(**flags):
+    for name, value in flags.items():
+        require_flag(name, value)
 
 
-def plain(ax: Any) -> None:
-    """Axes without a box, with small numbers."""
-    for side in ("top", "right"):
-        ax.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        ax.spines[side].set_color(MUTED)
-    ax.tick_params(color=MUTED, labelcolor=INK, labelsize=8)
-
-
-def dress(ax: Any, title: str | None, note: str = "", unit: str = "") -> None:
-    """Title, or None, labels of the axes, and a small note above the picture."""
+def dress(ax: Any, title: str | None, xlabel: str = "x", ylabel: str = "y", note: str = "") -> None:
+    """Axes without a box, with small numbers: title, or None, labels, a small note above."""
     if title:
         ax.set_title(title, loc="left", fontsize=10, color=INK, pad=18 if note else 6)
-    plain(ax)
-    ax.set_xlabel(f"x ({unit})" if unit else "x", fontsize=9, color=INK)
-    ax.set_ylabel(f"y ({unit})" if unit else "y", fontsize=9, color=INK)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set_color(MUTED)
+    ax.tick_params(color=MUTED, labelcolor=INK, labelsize=8)
+    ax.set_xlabel(xlabel, fontsize=9, color=INK)
+    ax.set_ylabel(ylabel, fontsize=9, color=INK)
     if note:
         ax.annotate(note, (0, 1), (0, 5), va="bottom",
                     xycoords="axes fraction", textcoords="offset points", fontsize=8, color=MUTED)

@@ -15,7 +15,7 @@ from ..core.errors import (AncfError, InputError, require_finite_scalar, require
                            require_positive, require_unmasked, shown)
 from ..core.types import Array
 from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_of, units_of,
-                               values_on_grid)
+                               values_on_grid, with_unit)
 from ..recovery.grids import Grid, grids, in_space
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
@@ -280,14 +280,15 @@ class Scenery:
             self.scale != 1.0))
 
     @property
-    def length(self) -> str:
-        """Unit of length of the scene, or ""."""
-        return (units_of(self._states[0]) or ("", ""))[1]
+    def axes(self) -> tuple[str, str]:
+        """Labels of the axes, with the unit of length if the scene has one."""
+        _, length = units_of(self._states[0]) or ("", "")
+        return with_unit("x", length), with_unit("y", length)
 
     def label(self, text: str, unit: str | None) -> str:
         """A text with the unit; by default that of the field in the scene; "" for none."""
-        unit = unit_of(self.field, units_of(self._states[0])) if unit is None else unit
-        return text if unit in ("", "1") else f"{text} ({unit})".strip()
+        return with_unit(text, unit_of(self.field, units_of(self._states[0])) if unit is None else
+                         unit)
 
     def colours(self, cmap: Any) -> Any:
         """The given colour map, or by default one that fits the field."""
