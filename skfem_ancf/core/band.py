@@ -17,6 +17,7 @@ from scipy import sparse
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse.linalg import splu
 
+from .callbacks import call_solver, handle_of
 from .source import F1, I1, apart, indices, primitive, shaped, source
 from .types import Array
 
@@ -57,13 +58,14 @@ def beside_zero(negative: Callable[[float], int]) -> Inertia:
 
 
 class Band(NamedTuple):
-    """A band matrix: entries, pivots of ``gbtrf``, and layout."""
+    """A band matrix: entries, pivots of ``gbtrf``, and layout; see :class:`Coupling`."""
 
     flat: F1
     pivots: I1
     ld: int
     width: int
     top: int
+    coupled: I1 = np.zeros(0, np.int64)
 
 
 class BandMatrix(Band):
@@ -285,25 +287,41 @@ class BandMatrix(Band):
         return sparse.coo_matrix((values, (i, j)), shape=(self.n, self.n)).tocsc()
 
 
-class CoupledBand(BandMatrix):
-    """A band matrix with entries anywhere, in NumPy alone: sparse factors while there are any.
-    ``entries()`` returns rows, columns and values (k,) each; of a symmetric matrix of both
-    halves."""
+class Coupling:
+    """Sparse factors of a band matrix with entries anywhere beside it, while there are any.
 
-    entries: Callable[[], tuple[Array, Array, Array]]
-    lu: Any = None
+    ``entries()`` returns rows, columns and values (k,) each; of a symmetric matrix of both halves.
+    ``band`` is the matrix, whose ``coupled`` are the handle of this and 1 while it has the factors.
+    """
 
-    def factorize_all(self) -> bool:
-        """Set ``lu``, None if there are no entries; False if it has none."""
-        self.lu, (i, j, v) = None, self.entries()
-        if not len(v):
+    _lu: Any = None
+
+    def __init__(self, A: BandMatrix, entries: Callable[[], tuple[Array, Array, Array]]) -> None:
+        self.entries = entries
+        self.band = A._replace(coupled=np.array([handle_of(self), 0], dtype=np.int64))
+
+    def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, x: Array,
+                   dm: Array) -> bool:
+        """Solve in place of x (N,), or factorise if it is empty; False on failure."""
+        if x.size:
+            x[:] = self._lu.solve(x)
             return True
-        try:
-            self.lu = splu(self.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(self.n, self.n)),
-                           "MMD_AT_PLUS_A", 0.01, options={"SymmetricMode": True})
-        except RuntimeError:
-            return False
+        A, (i, j, v) = self.band, self.entries()
+        A.coupled[1] = len(v) > 0
+        if len(v):
+            try:
+                self._lu = splu(A.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(A.n, A.n)),
+                                "MMD_AT_PLUS_A", 0.01, options={"SymmetricMode": True})
+            except RuntimeError:
+                return False
         return True
+
+
+@source
+def coupling(A, x):
+    """Solve with the :class:`Coupling` of A in place of x, or factorise if it is empty."""
+    none = x[:0]
+    return call_solver(A.coupled[0], 0.0, none, none, none, none, x, none)
 
 
 def _entries(A):
@@ -350,10 +368,10 @@ def add_multiple(c, x, y):
 def factorize(A):
     """Factorise in place; False if a pivot is round-off. Only LAPACK's storage is pivoted. An
     indefinite symmetric matrix has L D L^T factors unless a leading submatrix is singular."""
-    if isinstance(A, CoupledBand):
-        if not A.factorize_all():
+    if A.coupled.size > 0:
+        if not coupling(A, A.flat[:0]):
             return False
-        if A.lu is not None:
+        if A.coupled[1] > 0:
             return True
     ab = as_lapack(A)
     if A.top > 0:
@@ -480,8 +498,10 @@ def solve_definite(A, L, fixed, b, x):
 
 def solve_many(A: Band, B: Array, X: Array) -> None:
     """X[k] = A^-1 B[k] for all k, with factors of A; B and X are (m, N)."""
-    if isinstance(A, CoupledBand) and A.lu is not None:
-        X[:] = A.lu.solve(B.T.copy()).T
+    if A.coupled.size > 0 and A.coupled[1] > 0:
+        for b, x in zip(B, X):
+            copy(b, x)
+            coupling(A, x)
         return
     ab = as_lapack(A)
     if A.top > 0:

@@ -6,7 +6,7 @@ Each replaces the function of its name that :func:`skfem_ancf.core.source.primit
 import numpy as np
 
 from .callbacks import ask, solved
-from .band import LOST, REPEATED, SPARE, Band
+from .band import LOST, REPEATED, SPARE, Band, coupling
 from .source import F1, F2, I1, apart, source
 
 indices = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}
@@ -27,11 +27,18 @@ def multiply(A, x, y):
 
 
 def factorize(A):
+    if A.coupled.size > 0:
+        if not coupling(A, A.flat[:0]):
+            return False
+        if A.coupled[1] > 0:
+            return True
     return (exchange(A) if A.top > 0 else factorize_lower(A.flat, A.ld, A.width)) > 0
 
 
 def solve(A, x):
-    if A.top > 0:
+    if A.coupled.size > 0 and A.coupled[1] > 0:
+        coupling(A, x)
+    elif A.top > 0:
         solve_exchanged(A, x)
     else:
         solve_lower(A.flat, A.ld, A.width, x)

@@ -13,7 +13,7 @@ import numpy as np
 from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.tables import constraint, joint_directions
 from ..beam.strain_energy import gradients_size
-from ..core.band import BandMatrix, CoupledBand, factorize, fix, solve
+from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError, InputError, SupportError, require_positive, shown
 from ..core.source import I1
@@ -122,8 +122,9 @@ class Integrator:
             self._nodes = Condensed(system, A), CondensedMass(system)
         unsymmetric = scheme.conserving and self._nodes is None
         U = BandMatrix.zeros(system.N if unsymmetric else 0, system.bandwidth, symmetric=False)
-        self._matrices = Matrices(M, system.mass_solver.factors, _coupled(A, system),
-                                  _coupled(U, system), *_damping(system))
+        self._couplings = [_coupled(X, system) for X in (A, U) if system.forces.changing]
+        A, U = [one.band for one in self._couplings] or (A, U)
+        self._matrices = Matrices(M, system.mass_solver.factors, A, U, *_damping(system))
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self._rule = Rule._make([
             int(scheme.conserving), *map(float, scheme.parameters), self.tol,
@@ -446,7 +447,7 @@ class Integrator:
             self.system.forces.kept = i, j, values
             self.system.forces.clear[HAS_ENTRIES] = float(len(i) > 0)
             if self.ready:
-                factors(self._matrices, self._state).factorize_all()
+                coupling(factors(self._matrices, self._state), np.zeros(0))
         if self._nodes:
             steps, mass = self._nodes
             if self.ready:
@@ -462,18 +463,15 @@ class Integrator:
 
 
 def _coupled(A, system):
-    """A band matrix, with the entries of force elements that couple DOFs anywhere."""
-    if not system.forces.changing:
-        return A
-    A, free = CoupledBand(*A), system.constraints.free
+    """The :class:`Coupling` of a band matrix with force elements that couple DOFs anywhere."""
+    free = system.constraints.free
 
     def entries():
         i, j, values = system.forces.kept
         kept = free[i] & free[j]
         return i[kept], j[kept], values[kept]
 
-    A.entries = entries
-    return A
+    return Coupling(A, entries)
 
 
 def _damping(system):

@@ -110,8 +110,6 @@ class Backend:
         """The choice for the next call of a kernel, by its name and expected iterations."""
         missing = self._missing(name)
         off = self._plain or (PROBLEMS[0] if PROBLEMS else compiled_off())
-        if name in ("steps", "collocate") and self.tables.system.forces.changing:
-            off = off or "contact of members, or another sparse stiffness"
         if off is not None:
             return Choice("plain", off)
         if not missing:

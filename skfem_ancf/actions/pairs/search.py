@@ -15,7 +15,7 @@ from .gap import Surfaces, cross, dot
 #: Distance of seeds along facets, largest number on a facet, and the distance for which a list of
 #: candidates is enough, in heights; larger ones tried where nothing is near.
 SEEDS, MOST, SKIN = 1.2, 10, 0.5
-SKINS = 64.0, 16.0, 4.0
+SKINS = 2.0, 5.0, 12.0, 30.0, 75.0
 #: No contact of a beam with itself, or with a beam that it is joined to, within so many heights.
 APART = 3.0
 #: Distance of axes that are joined, in heights; parts of an element in which they are searched.
@@ -87,9 +87,9 @@ class Search:
             self._known = known = self._search(x, z, SKIN * self.height)
             for skin in SKINS if not len(known.p) else ():  # how far may it move unseen?
                 wide = self._search(x, z, skin * self.height)
-                if not len(wide.p):
-                    self._known = known = wide
+                if len(wide.p):
                     break
+                self._known = known = wide
         return known, x, n
 
     def _search(self, x, z, skin):
