@@ -13,12 +13,11 @@ from .actions.point_force import FollowerForce, MovingForce, PointForce, Train
 from .actions.pairs import BodyContact
 from .actions.obstacles import Circle, Contact, Line, Obstacle, Polygon, SignedDistance
 from .actions.supports import Clamp, Pin, Support
-from .beam.beam import Beam, reference_coordinates
+from .beam import Beam, RigidBody, reference_coordinates
 from .beam.domain import Domain
-from .beam.rigid import RigidBody
-from .core.errors import (AncfError, CallError, CallbackError, CheckpointError, ConvergenceError,
-                          FileError, InputError, Interrupted, MeshError, MissingExtra, ModelWarning,
-                          NameUnknown, StabilityWarning, SupportError)
+from .core import (AncfError, CallError, CallbackError, CheckpointError, ConvergenceError,
+                   FileError, InputError, Interrupted, MeshError, MissingExtra, ModelWarning,
+                   NameUnknown, StabilityWarning, SupportError)
 from .dynamics import EnergyMomentum, Gauss, GeneralizedAlpha, HHT, Newmark, Radau, Scheme
 from .dynamics.history import History
 from .dynamics.sensors import Readings
@@ -37,17 +36,15 @@ from .recovery.resultants import Resultants
 from .results.checks import Checks
 from .results.path import CriticalPoint, Path
 from .results.response import FrequencyResponse
-from .results.output import Extreme
-from .results.state import Reaction, State
+from .results import Extreme, Reaction, State
 from .scene.cases import Envelope, LoadCases
 from .scene.design import Design
 from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
 from .scene.motion_design import MotionDesign
 from .scene.parameters import Parameters
-from .scene.frame import Frame
+from .scene import Frame, Scene
 from .scene.solve import Plan
 from .scene.linear_model import LinearModel, StateSpace
-from .scene.scene import Scene
 from .scene.stepper import Stepper
 from .sections import Section
 from .results.modes import Buckling, Modes

@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .core.errors import (CallError, CallbackError, InputError, Interrupted, NameUnknown,
-                          PickleError, SweepWarning, require_function, require_integer,
-                          require_like, require_module, shown, warn)
+from .core import (Array, ArrayLike, CallError, CallbackError, InputError, Interrupted, NameUnknown,
+                   PickleError, SweepWarning, require_function, require_integer, require_like,
+                   require_module, shown, warn)
 from .core.progress import progress_bar
-from .core.types import Array, ArrayLike
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 

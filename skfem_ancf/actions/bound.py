@@ -8,15 +8,12 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
 from ..beam.distribution import Facets
 from ..beam.layout import Layout
-from ..core.errors import (InputError, require_finite, require_slope, shown,
-                           warnings_as_errors)
-from ..core.immutable import cached_property, is_builtin
-from ..core.types import Array
+from ..core import (Array, ArrayLike, InputError, cached_property, is_builtin, require_finite,
+                    require_slope, shown, warnings_as_errors)
 from .places import Vector
 
 #: Relative step of differences, where a force does not accept complex numbers.

@@ -23,9 +23,8 @@ from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.remembered import has_history, remembers
 from ..beam.strains import on_grid, strain_at, stretched
-from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
-from ..core.linear import stress_of
-from ..core.types import Array, TimeFunction
+from ..core import (Array, InputError, TimeFunction, ask_array, require_finite_scalar,
+                    require_function, shown, stress_of)
 from ..formulations import COMPONENTS
 from ..sections import Layer
 from .item import Item, takes_time

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
 from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, Sampled, groups_of,
@@ -15,10 +14,9 @@ from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, S
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
-from ..core.errors import (InputError, NameUnknown, ask, require_finite, require_flag,
-                           require_function, require_module, require_slope, shown)
-from ..core.quadrature import gauss, product_rule
-from ..core.types import Array, Place, TimeFunction
+from ..core import (Array, ArrayLike, InputError, NameUnknown, Place, TimeFunction, ask, gauss,
+                    product_rule, require_finite, require_flag, require_function, require_module,
+                    require_slope, shown)
 from .bound import at_generic_displacements
 from .item import Item
 from .loads import Load

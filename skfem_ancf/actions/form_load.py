@@ -14,10 +14,8 @@ from skfem.element import DiscreteField
 from ..beam.distribution import AXIS, BODY, Distribution, Sampled, facets_along
 from ..beam.domain import Domain
 from ..beam.layout import WhichMember
-from ..core.errors import (CallbackError, InputError, explained, require_finite, require_flag,
-                           require_slope, shown, warnings_as_errors)
-from ..core.quadrature import gauss
-from ..core.types import Array, Place, TimeFunction
+from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss,
+                    require_finite, require_flag, require_slope, shown, warnings_as_errors)
 from .energy import Density, points_of
 from .bound import at_generic_displacements
 from .loads import DeadLoad

@@ -8,8 +8,7 @@ from os import urandom
 from typing import TYPE_CHECKING, Any
 
 from ..beam.layout import Layout
-from ..core.errors import InputError, explained, shown
-from ..core.immutable import Immutable
+from ..core import Immutable, InputError, explained, shown
 from .bound import Bound, user_parts
 
 if TYPE_CHECKING:

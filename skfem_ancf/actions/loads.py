@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..beam.beam import Beam
@@ -19,12 +18,9 @@ from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
-from ..core.errors import (AncfError, InputError, ModelWarning, ask_field, ask_number,
-                           require_finite, require_finite_scalar, require_function, require_slope,
-                           sample, shown, warn)
-from ..core.immutable import is_builtin, read_only
-from ..core.quadrature import gauss
-from ..core.types import Array, Place, TimeFunction
+from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,
+                    ask_field, ask_number, gauss, is_builtin, read_only, require_finite,
+                    require_finite_scalar, require_function, require_slope, sample, shown, warn)
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .bound import BoundForce, at_generic_displacements, require_entries, user_parts

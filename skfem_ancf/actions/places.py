@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..beam.beam import Beam
+from ..beam import Beam, RigidBody
 from ..beam.domain import Domain
 from ..beam.kinematics import locate, probe_reference
 from ..beam.kinematics import direction as direction_of, direction_weights
 from ..beam.layout import Layout, WhichMember
-from ..beam.rigid import RigidBody
-from ..core.errors import InputError, MeshError, require_finite, shown
-from ..core.types import Array
+from ..core import Array, ArrayLike, InputError, MeshError, require_finite, shown
 from ..mesh.places import as_point, is_place, is_point, node_of, points_of_rows
 
 #: Name of the ground, in place of a beam.

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
 from ..beam.distribution import Distribution, on_points
@@ -16,9 +15,8 @@ from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.masses import TURN
 from ..beam.points import Points
 from ..beam.rigid import RigidBody, on_body
-from ..core.errors import (InputError, ask, require_direction, require_finite,
-                           require_finite_scalar, require_positive)
-from ..core.types import Array, TimeFunction
+from ..core import (Array, ArrayLike, InputError, TimeFunction, ask, require_direction,
+                    require_finite, require_finite_scalar, require_positive)
 from ..mesh.places import as_point
 from .item import Item
 from .places import dense_entries, point, section

@@ -12,8 +12,7 @@ from ..beam.domain import Domain
 from ..beam.kinematics import plane
 from ..beam.layout import Layout, WhichBeam
 from ..beam.rigid import on_body
-from ..core.errors import InputError, SupportError, require_finite_scalar, require_option, shown
-from ..core.types import Place
+from ..core import InputError, Place, SupportError, require_finite_scalar, require_option, shown
 from ..mesh.places import is_point, node_of
 from .item import Item
 from .symbols import Symbol, supports_of

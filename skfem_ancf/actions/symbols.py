@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.beam import Beam
+from ..beam import Beam, RigidBody
 from ..beam.domain import Domain
 from ..beam.kinematics import direction_weights, probe_reference
 from ..beam.layout import Layout
-from ..beam.rigid import RigidBody
-from ..core.types import Array
+from ..core import Array
 from ..mesh.places import facets_of
 from .places import Vector, point
 

@@ -12,7 +12,7 @@ from ..beam.strain_energy import (FlatBody, add_eigen_force, add_eigen_mean, add
                                   put_eigenstrains)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import FORCE, JOINTS, MEAN_FORCE, STIFFNESS, call_custom
-from ..core.source import F1, F2, I1, apart, indices, primitive, source
+from ..core import F1, F2, I1, apart, indices, primitive, source
 
 
 #: Number of ``lasting`` from which on materials have a history, see

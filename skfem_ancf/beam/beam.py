@@ -6,16 +6,14 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csr_matrix
 from skfem.assembly import Basis, FacetBasis
 from skfem.element import ElementVector
 
-from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
-                           require_label, require_like, require_names, require_unmasked, shown)
-from ..core.immutable import Immutable, cached_property, read_only
-from ..core.types import Array, Place
+from ..core import (Array, ArrayLike, Immutable, InputError, NameUnknown, Place, cached_property,
+                    read_only, require_finite, require_flag, require_integer, require_label,
+                    require_like, require_names, require_unmasked, shown)
 from ..elements import ElementBeam, choose_element
 from ..formulations import Formulation, Term, get_formulation
 from ..materials import Material

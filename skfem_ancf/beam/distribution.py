@@ -8,10 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from ..core.quadrature import gauss, lagrange
-from ..core.types import Array, Place
+from ..core import Array, ArrayLike, Place, gauss, lagrange
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.places import facets_of
 from ..sections.across import jumps, pieces

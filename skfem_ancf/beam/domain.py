@@ -7,17 +7,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from skfem import Basis, BilinearForm, ElementVector, LinearForm
 from skfem.assembly.dofs import DofsView
 
-from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, explained,
-                           require_finite, require_label, require_slope, shown)
-from ..core.immutable import Immutable, read_only
-from ..core.quadrature import gauss
-from ..core.types import Array
+from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, NameUnknown,
+                    explained, gauss, read_only, require_finite, require_label, require_slope,
+                    shown)
 from ..materials import Material
 from ..mesh.places import as_point, is_point
 from .solid import SolidForms, grade_at

@@ -10,10 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, ModelWarning, warn
-from ..core.linear import first_order
-from ..core.quadrature import gauss
-from ..core.types import Array
+from ..core import Array, InputError, ModelWarning, first_order, gauss, warn
 from ..mesh.places import as_point
 from .kernels import CableKernel, SectionKernel
 from .strains import cable_axis, fibres

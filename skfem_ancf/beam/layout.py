@@ -10,8 +10,7 @@ import numpy as np
 
 from .beam import Beam
 from .domain import Domain
-from ..core.errors import InputError, NameUnknown, shown
-from ..core.types import Array
+from ..core import Array, InputError, NameUnknown, shown
 from .rigid import RigidBody
 
 #: Argument of :func:`select_beam`: a Beam, its name or number; None for the only one.

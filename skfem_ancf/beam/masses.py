@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.band import BandMatrix
-from ..core.quadrature import gauss, product_rule, tensor
-from ..core.types import Array, Rule
+from ..core import Array, Rule, gauss, product_rule, tensor
 from ..formulations import AXIS
 
 #: Additional points along an element of variable section.

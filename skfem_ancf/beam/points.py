@@ -11,10 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.immutable import cached_property
-from ..core.errors import (InputError, MeshError, require_finite, require_integer, require_point,
-                           shown)
-from ..core.types import Array
+from ..core import (Array, InputError, MeshError, cached_property, require_finite, require_integer,
+                    require_point, shown)
 from ..mesh.places import as_point
 from .beam import Beam
 from .domain import Domain, DomainPoints

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.types import Array
+from ..core import Array
 from .kernels.histories import Past
 from ..materials import HistoryMaterial
 

@@ -6,13 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..core.errors import (InputError, require_finite, require_finite_scalar, require_label,
-                           require_names, require_positive, shown)
-from ..core.immutable import Immutable, read_only, rebuilt
-from ..core.linear import angle_of
-from ..core.types import Array
+from ..core import (Array, ArrayLike, Immutable, InputError, angle_of, read_only, rebuilt,
+                    require_finite, require_finite_scalar, require_label, require_names,
+                    require_positive, shown)
 from ..mesh.places import as_point
 
 #: Names of the DOFs: position of the centre of mass, and director.

@@ -9,8 +9,7 @@ from skfem.assembly import BilinearForm, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.helpers import dot
 
-from ..core.errors import InputError, require_like, require_positive
-from ..core.types import Array
+from ..core import Array, InputError, require_like, require_positive
 from ..materials import HistoryMaterial, Material
 from ..sections.section import evaluated
 

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy
-from ..core.immutable import cached_property
-from ..core.source import I1, I2, primitive, shaped, source
+from ..core import I1, I2, cached_property, primitive, shaped, source
 from .beam import Beam
 from .kernels.elements import Elements
 from .kernels.histories import Past, elements_of, remembering

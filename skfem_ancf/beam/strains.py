@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
 from numpy.polynomial.polynomial import polyval
 
-from ..core.types import Array, Law, Rule
+from ..core import Array, Law, Rule
 from ..formulations import COMPONENTS, Term
 from .remembered import between, elements_of, has_history
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.types import Array
+from ..core import Array
 from ..equations.system import System
 
 #: Fraction of a step below which accelerations are interpolated.

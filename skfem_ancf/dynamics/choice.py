@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.errors import require_option
+from ..core import require_option
 from ..equations.system import System
 from .base import Scheme
 from .collocation import Gauss, Radau

@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, require_integer
-from ..core.immutable import read_only
-from ..core.quadrature import gauss
-from ..core.types import Array
+from ..core import Array, InputError, gauss, read_only, require_integer
 from ..equations.system import System
 from .base import Motion, Scheme, derivative, difference_row, grown
 from .stage_tangent import Method

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.errors import InputError
-from ..core.types import Array
+from ..core import Array, InputError
 from ..equations.system import System
 from .base import Motion, Scheme, derivative, grown
 

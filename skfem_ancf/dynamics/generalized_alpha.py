@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ..core.errors import InputError, require_finite_scalar
-from ..core.types import Array
+from ..core import Array, InputError, require_finite_scalar
 from .base import Motion, Scheme
 
 

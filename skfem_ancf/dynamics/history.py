@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..actions.forces.springs import Turns
 from ..actions.joints.base import Joint
 from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember
 from ..beam.points import require_body
-from ..core.errors import InputError, require_finite, require_index, shown
-from ..core.types import Array, Place, StrPath
+from ..core import (Array, ArrayLike, InputError, Place, StrPath, require_finite, require_index,
+                    shown)
 from ..equations.system import System
 from ..core.progress import progress_bar
 from ..io.tables import to_xarray

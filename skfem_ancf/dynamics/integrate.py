@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..core.archive import Unreadable, read, write
-from ..core.errors import (AncfError, CheckpointError, CheckpointWarning, ConvergenceError,
-                           InputError, Interrupted, ModelWarning, require_flag, require_function,
-                           require_integer, require_path, shown, warn)
+from ..core import (AncfError, Array, CheckpointError, CheckpointWarning, ConvergenceError,
+                    InputError, Interrupted, ModelWarning, StrPath, require_flag, require_function,
+                    require_integer, require_path, shown, warn)
 from ..core.progress import progress_bar
-from ..core.types import Array, StrPath
 from ..equations.stability import largest_displacement
 from ..equations.system import System
 from ..results.state import State

@@ -15,9 +15,7 @@ from ..actions.tables import constraint, joint_directions
 from ..beam.strain_energy import gradients_size
 from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core.callbacks import handle_of
-from ..core.errors import ConvergenceError, InputError, SupportError, require_positive, shown
-from ..core.source import I1
-from ..core.types import Array
+from ..core import I1, Array, ConvergenceError, InputError, SupportError, require_positive, shown
 from ..core.words import hints
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System

@@ -11,7 +11,7 @@ from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import accept_body, add_viscous_force, body_tangent
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..core.callbacks import JOINTS, call_custom
-from ..core.source import F1, F2, F3, I1, MADE, apart, indices, source
+from ..core import F1, F2, F3, I1, MADE, apart, indices, source
 from ..equations.tables import Equations
 
 

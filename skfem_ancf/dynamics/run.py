@@ -12,10 +12,9 @@ import numpy as np
 import scipy
 
 from ..actions.forces.springs import Turns
-from ..core.errors import (AncfError, CheckpointError, InputError, ModelWarning, ask_number,
-                           require_finite, require_finite_scalar, require_increasing,
-                           require_positive, shown, warn)
-from ..core.types import Array
+from ..core import (AncfError, Array, CheckpointError, InputError, ModelWarning, ask_number,
+                    require_finite, require_finite_scalar, require_increasing, require_positive,
+                    shown, warn)
 from ..equations.system import System
 from ..results.state import State
 from .base import Motion, Scheme, in_blocks, interpolate, same_scheme

@@ -13,10 +13,8 @@ from ..actions.joints.base import Joint
 from ..beam.layout import WhichBeam
 from ..beam.points import Located
 from ..core.archive import output_file
-from ..core.errors import (CallbackError, CheckpointError, InputError, NameUnknown, ask_array,
-                           require_flag, require_module, require_path, shown)
-from ..core.immutable import Immutable
-from ..core.types import Array, StrPath
+from ..core import (Array, CallbackError, CheckpointError, Immutable, InputError, NameUnknown,
+                    StrPath, ask_array, require_flag, require_module, require_path, shown)
 from ..equations.system import System
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State

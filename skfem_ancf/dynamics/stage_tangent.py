@@ -10,7 +10,7 @@ from ..actions.tables import add_load_stiffness, joint_directions
 from ..beam.strain_energy import body_mean_stress, body_stress, body_tangent, body_tangent_by
 from ..core.band import (SPARE, Band, add_multiple, copy, factorize, factorize_complex, fix_stored,
                          solve, solve_complex, solve_dependent)
-from ..core.source import F1, F2, F3, indices, shaped, source
+from ..core import F1, F2, F3, indices, shaped, source
 from .records import JointMotions, add_damping, row_of
 
 

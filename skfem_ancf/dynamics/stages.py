@@ -14,7 +14,7 @@ from ..core.band import add_multiple, clear, copy, multiply, solve, solve_joined
 from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force,
                                   body_gradients, body_mixed, body_stress, linearised_by)
 from ..actions.forces.kernels import add_elastic_force, set_contact_rate
-from ..core.source import indices, source
+from ..core import indices, source
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, carry_eigenstrains,
                               constraint, external_force, joint_directions)
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,

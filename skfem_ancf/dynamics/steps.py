@@ -21,7 +21,7 @@ from ..actions.tables import MATERIALS, add_constraint_rate, carry_eigenstrains,
 from ..beam.strain_energy import body_linearised, body_stress, quadratic
 from ..core.band import clear, copy, dot, solve_joined, subtract_rows, total
 from ..core.callbacks import call_solver
-from ..core.source import F1, apart, indices, shaped, source
+from ..core import F1, apart, indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, LASTING, MIXED, NOT_CONVERGED,
                                      RESTART, REUSED, ROUGH, SLOW, SYMMETRIC, UNSETTLED,
                                      UNSYMMETRIC, judged, noise_of_step)

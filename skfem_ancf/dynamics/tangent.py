@@ -11,7 +11,7 @@ from ..beam.strain_energy import (add_force_of, add_unsymmetric, body_force, bod
 from ..core.band import (add_multiple, add_scaled, clear, copy, dot, factorize, fix, multiply,
                          subtract_rows)
 from ..core.callbacks import JOINTS, call_custom, call_solver
-from ..core.source import apart, indices, source
+from ..core import apart, indices, source
 from ..equations.convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
 from .records import ALL, add_damping, damping_force, factorize_rows
 

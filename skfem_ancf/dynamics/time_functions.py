@@ -12,9 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
-from ..core.errors import sample
-from ..core.immutable import array_cache, read_only
-from ..core.types import Array
+from ..core import Array, array_cache, read_only, sample
 from ..equations.system import System
 
 #: Sample points in a step for the rates.

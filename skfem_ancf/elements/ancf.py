@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..core.errors import (InputError, require_integer, require_like, require_names, require_option,
-                           require_positive)
-from ..core.immutable import is_builtin, read_only
-from ..core.quadrature import gauss_lobatto, hermite_basis
-from ..core.types import Array
+from ..core import (Array, InputError, gauss_lobatto, hermite_basis, is_builtin, read_only,
+                    require_integer, require_like, require_names, require_option, require_positive)
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.mapping import SECTIONS
 from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, StabilisedMode, require_degree

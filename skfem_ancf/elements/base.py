@@ -7,13 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike
 from skfem.element import DiscreteField, Element
 
-from ..core.errors import InputError, MeshError, require_finite, shown
-from ..core.immutable import Immutable, cached_property
-from ..core.quadrature import gauss, gauss_lobatto, hermite_basis
-from ..core.types import Array, Rule
+from ..core import (Array, ArrayLike, Immutable, InputError, MeshError, Rule, cached_property,
+                    gauss, gauss_lobatto, hermite_basis, require_finite, shown)
 from ..mesh.mapping import SECTIONS, MappingBeam, nodal_derivatives, turned
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.numbering import RefBeam

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..beam.beam import Beam
 from ..core.band import NO_FACTORS, SMALL, BandMatrix, Inertia
-from ..core.types import Array
+from ..core import Array
 from .signature import diagonal_factors
 
 logger = logging.getLogger(__name__)

@@ -13,11 +13,8 @@ from scipy import sparse
 from ..actions.bound import BoundConstraint, everywhere, is_table
 from ..actions.joints.base import IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
-from ..beam.beam import Beam
-from ..beam.rigid import RigidBody
-from ..core.errors import InputError, ModelWarning, SupportError, shown
-from ..core.immutable import cached_property, is_builtin
-from ..core.types import Array
+from ..beam import Beam, RigidBody
+from ..core import Array, InputError, ModelWarning, SupportError, cached_property, is_builtin, shown
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
 from .signature import DENSE, FREE, first_dependent
 

@@ -23,8 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.source import source
-from ..core.types import Array
+from ..core import Array, source
 
 # the rule
 

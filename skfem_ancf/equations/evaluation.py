@@ -11,7 +11,7 @@ from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, ca
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
 from ..core.band import add_to_diagonal, diagonal, dot, largest, weighted_square
-from ..core.source import F1, F2, MADE, apart, indices, source
+from ..core import F1, F2, MADE, apart, indices, source
 from .tables import Equations
 
 

@@ -14,7 +14,7 @@ from ..actions.forces.system import Forces
 from ..beam.beam import Beam
 from ..beam.kernels.histories import ElementsWithHistory, Past, history_size
 from ..beam.remembered import remembers, with_history
-from ..core.types import Array
+from ..core import Array
 
 
 class Histories:

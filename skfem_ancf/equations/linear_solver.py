@@ -17,9 +17,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..core.band import NO_FACTORS, SMALL, BandMatrix, Inertia, fix
-from ..core.immutable import cached_property
+from ..core import Array, cached_property
 from ..core.callbacks import handle_of
-from ..core.types import Array
 from .condensation import Condensed
 from .signature import DEPENDENT, Block, blocks, determinant_sign, diagonal_factors, inertia_of
 

@@ -9,9 +9,8 @@ from ..beam.kernels.compiled import CompiledTables, compiled_pattern, compiled_t
 from ..beam.kernels.law import point_of
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
-from ..core.immutable import is_builtin
+from ..core import F1, F3, is_builtin
 from ..core.jit import address, caller, compiled, reader
-from ..core.source import F1, F3
 from ..core.words import Words
 from .tables import Equations
 

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from ..core.band import Band, BandMatrix, dense, factorize, fix, solve_dependent
-from ..core.errors import InputError, shown
-from ..core.types import Array
+from ..core import Array, InputError, shown
 from .condensation import CondensedMass
 
 #: Number of joint equations above which time integration condenses a frame.

@@ -9,9 +9,8 @@ from scipy import sparse
 
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.strain_energy import body_tangent
-from ..core.errors import InputError
+from ..core import Array, InputError
 from ..core.band import BandMatrix
-from ..core.types import Array
 from .strain_tangent import load_stiffness
 from .system import System
 

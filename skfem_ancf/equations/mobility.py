@@ -12,7 +12,7 @@ from scipy import sparse
 from ..actions.joints.nodes import chain_ends
 from ..beam.domain import Domain
 from ..beam.rigid import RigidBody
-from ..core.types import Array
+from ..core import Array
 from .signature import DENSE, DEPENDENT, groups, null_space, row_sizes, unit_rows
 
 # redundant equations of joints

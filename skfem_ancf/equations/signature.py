@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..core.band import SMALL, Inertia, beside_zero, dense
-from ..core.types import Array
+from ..core import Array
 
 #: Relative remainder of a dependent row.
 DEPENDENT = 1e-9

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from ..core.band import NO_FACTORS, Inertia, fix
-from ..core.types import Array
+from ..core import Array
 
 logger = logging.getLogger(__name__)
 

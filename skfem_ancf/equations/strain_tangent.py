@@ -19,8 +19,7 @@ from scipy.sparse.linalg import splu
 
 from ..actions.forces.kernels import add_elastic_force
 from ..beam.kinematics import element_dofs, entries_of
-from ..core.errors import ConvergenceError, SupportError
-from ..core.types import Array
+from ..core import Array, ConvergenceError, SupportError
 from .condensation import Condensed
 
 #: Largest number of refinements; their tolerance, and the largest accepted correction.

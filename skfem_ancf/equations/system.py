@@ -19,15 +19,12 @@ from ..actions.joints.base import UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..actions.tables import MATERIALS, carry_eigenstrains
-from ..beam.beam import Beam
+from ..beam import Beam, RigidBody
 from ..beam.domain import Domain
 from ..beam.kinematics import bent
 from ..beam.points import Points
-from ..beam.rigid import RigidBody
-from ..core.immutable import cached_property
-from ..core.errors import InputError
+from ..core import Array, InputError, cached_property
 from ..core.band import BandMatrix
-from ..core.types import Array
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
 from . import evaluation

@@ -8,7 +8,7 @@ from weakref import proxy, ref
 import numpy as np
 
 from ..core.band import Band, dense
-from ..core.immutable import cached_property
+from ..core import F1, I1, Array, cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
@@ -17,11 +17,9 @@ from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import CABLE, linearised
 from ..core.callbacks import handle_of
-from ..core.source import F1, I1
 from ..core.words import constant
 from ..actions.loads import Load
 from ..actions.tables import JointTables, LoadTables
-from ..core.types import Array
 
 #: Empty tables.
 _NO_INTS = np.zeros(0, np.int64)

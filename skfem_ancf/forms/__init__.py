@@ -35,7 +35,6 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
 from skfem.element import DiscreteField
 from skfem.helpers import dot
@@ -43,8 +42,8 @@ from skfem.helpers import dot
 from ..actions.energy import Energy, points_of
 from ..beam.kinematics import element_dofs
 from ..beam.solid import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
-from ..core.errors import InputError, ask_field, require_finite, require_like, require_positive
-from ..core.types import Array
+from ..core import (Array, ArrayLike, InputError, ask_field, require_finite, require_like,
+                    require_positive)
 from ..formulations import get_formulation
 from ..materials.base import Material
 

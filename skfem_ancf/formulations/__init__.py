@@ -10,12 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.errors import InputError, require_finite_scalar, require_like, require_option
-from ..core.quadrature import gauss
-from ..core.types import Array
+from ..core import Array, InputError, gauss, require_finite_scalar, require_like, require_option
 from ..elements.base import ElementBeam
-from ..materials import LinearLaw
-from ..materials.base import Material
+from ..materials import LinearLaw, Material
 from ..materials.history import AtRest
 from ..mesh.mesh_beam import MeshBeam
 from .base import COMPONENTS, Formulation, Term, refuse_rigid_sections

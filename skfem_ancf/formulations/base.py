@@ -8,11 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, require_like
-from ..core.immutable import Immutable, cached_property, read_only
-from ..core.linear import stress_of
-from ..core.quadrature import gauss, lagrange, product_rule
-from ..core.types import Array, Law, Rule
+from ..core import (Array, Immutable, InputError, Law, Rule, cached_property, gauss, lagrange,
+                    product_rule, read_only, require_like, stress_of)
 from ..elements.base import ElementBeam
 from ..materials.base import Material
 from ..materials.history import AtRest

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..beam.layout import select_member
-from ..core.errors import InputError, require_module, shown
+from ..core import InputError, require_module, shown
 from ..recovery.fields import find_fields, unit_of, units_of
 from ..recovery.grids import body_of, grids
 

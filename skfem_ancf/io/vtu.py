@@ -11,9 +11,8 @@ import numpy as np
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
-from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
-                           require_option, require_path, require_text)
-from ..core.types import StrPath
+from ..core import (InputError, StrPath, require_finite_scalar, require_flag, require_like,
+                    require_option, require_path, require_text)
 from ..recovery.fields import FIELDS, find_fields, unit_of, units_of
 from ..recovery.grids import COMPONENTS, body_of, facts_of, grids, in_space
 

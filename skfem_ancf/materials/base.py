@@ -7,13 +7,10 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..core.errors import (InputError, require_finite, require_finite_scalar, require_like,
-                           require_option, require_positive, require_slope, shown)
-from ..core.immutable import Immutable, is_builtin, rebuilt
-from ..core.quadrature import gauss
-from ..core.types import Array, Law
+from ..core import (Array, ArrayLike, Immutable, InputError, Law, gauss, is_builtin, rebuilt,
+                    require_finite, require_finite_scalar, require_like, require_option,
+                    require_positive, require_slope, shown)
 from .library import values_of
 
 if TYPE_CHECKING:

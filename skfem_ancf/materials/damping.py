@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..core.errors import InputError, require_finite, require_not_negative, shown
-from ..core.immutable import Immutable
+from ..core import ArrayLike, Immutable, InputError, require_finite, require_not_negative, shown
 
 
 class KelvinVoigt(Immutable):

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..core.errors import (InputError, require_finite, require_finite_scalar, require_not_negative,
-                           require_positive, shown)
-from ..core.types import Array
+from ..core import (Array, ArrayLike, InputError, require_finite, require_finite_scalar,
+                    require_not_negative, require_positive, shown)
 from .history import ACROSS, HistoryMaterial
 
 #: Newton corrections of a return to the yield surface, and the relative gap at the end.

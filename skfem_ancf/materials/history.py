@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import (ConvergenceError, InputError, require_integer, require_positive,
-                           require_slope)
-from ..core.immutable import rebuilt
-from ..core.types import Array, Law
+from ..core import (Array, ConvergenceError, InputError, Law, rebuilt, require_integer,
+                    require_positive, require_slope)
 from .base import LinearLaw, Material, hooke
 
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle

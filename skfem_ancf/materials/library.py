@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.errors import InputError, NameUnknown, shown
+from ..core import InputError, NameUnknown, shown
 
 #: Metres and newtons in a unit.
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}

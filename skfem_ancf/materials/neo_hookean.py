@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.source import primitive, source
-from ..core.types import Array, Law
+from ..core import Array, InputError, Law, primitive, source
 from .pointwise import PointwiseMaterial
 
 

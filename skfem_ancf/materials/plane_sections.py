@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.source import source
-from ..core.types import Array
+from ..core import Array, source
 from .pointwise import PointwiseMaterial
 
 #: Stiffness of the thickness over E.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.types import Array
+from ..core import Array
 from .base import Material
 
 #: Places of the six moduli of a symmetric matrix in its nine entries, row by row.

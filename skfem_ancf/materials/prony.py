@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..core.errors import InputError, require_finite, shown
-from ..core.types import Array
+from ..core import Array, ArrayLike, InputError, require_finite, shown
 from .base import Material
 from .history import HistoryMaterial
 

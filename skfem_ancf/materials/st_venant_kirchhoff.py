@@ -6,8 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from ..core.errors import require_positive
-from ..core.types import Array, Law
+from ..core import Array, Law, require_positive
 from .base import LinearLaw, Material, hooke
 
 

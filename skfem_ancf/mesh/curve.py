@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import (CallbackError, FileError, MeshError, ask_array, require_finite,
-                           require_finite_scalar, require_integer, require_path, warnings_as_errors)
-from ..core.quadrature import gauss
-from ..core.types import Array
+from ..core import (Array, CallbackError, FileError, MeshError, ask_array, gauss, require_finite,
+                    require_finite_scalar, require_integer, require_path, warnings_as_errors)
 
 # a smooth axis through points from an array or a text file
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import (FileError, InputError, MeshError, require_finite, require_module,
-                           require_names, require_option, require_path, shown)
+from ..core import (FileError, InputError, MeshError, require_finite, require_module, require_names,
+                    require_option, require_path, shown)
 from .frame_graph import FrameGraph
 
 

@@ -11,10 +11,9 @@ import scipy
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..core.errors import (InputError, MeshError, ModelWarning, NameUnknown, ask_field,
-                           require_finite, require_integer, require_label, require_moderate,
-                           require_not_negative, require_unmasked, shown, warn)
-from ..core.types import Array
+from ..core import (Array, InputError, MeshError, ModelWarning, NameUnknown, ask_field,
+                    require_finite, require_integer, require_label, require_moderate,
+                    require_not_negative, require_unmasked, shown, warn)
 from .curve import Curve
 from .mesh_beam import MeshBeam
 from .places import is_point, points_of_rows, satisfying

@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 from skfem.mapping import Mapping
 
-from ..core.errors import (InputError, MeshError, ask_array, require_function, require_positive,
-                           shown)
-from ..core.immutable import cached_property
-from ..core.quadrature import hermite_basis, lagrange
-from ..core.types import Array
+from ..core import (Array, InputError, MeshError, ask_array, cached_property, hermite_basis,
+                    lagrange, require_function, require_positive, shown)
 from .places import Inverse, InverseOfLines, with_slope
 
 #: Interpolation of sections with 1, 2, ... nodal derivatives along X, the 0th included.

@@ -10,18 +10,16 @@ from typing import Any
 
 import numpy as np
 from numpy import ndarray
-from numpy.typing import ArrayLike
 from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
 from ..core import archive
-from ..core.errors import (FileError, InputError, MeshError, NameUnknown, require_finite,
-                           require_finite_scalar, require_function, require_integer,
-                           require_moderate, require_option, require_options, require_path,
-                           require_positive, require_unmasked, shown)
-from ..core.immutable import Immutable, cached_property, is_builtin, packed
-from ..core.types import Array, StrPath
+from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, NameUnknown,
+                    StrPath, cached_property, is_builtin, packed, require_finite,
+                    require_finite_scalar, require_function, require_integer, require_moderate,
+                    require_option, require_options, require_path, require_positive,
+                    require_unmasked, shown)
 from .curve import Curve, axis_of, derivative_of
 from .mapping import SECTIONS, MappingBeam, heights_of, scaled
 from .numbering import NODAL, ElementBeamP1, NumberedMesh, default_tags, halved

@@ -8,15 +8,13 @@ from types import MappingProxyType
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike
 from skfem.element import ElementH1
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D
 from skfem.refdom import RefLine, RefQuad, Refdom
 
-from ..core.errors import MeshError, NearMisses, require_option, shown
-from ..core.immutable import Immutable, read_only
-from ..core.types import Array
+from ..core import (Array, ArrayLike, Immutable, MeshError, NearMisses, read_only, require_option,
+                    shown)
 from .mapping import halved as halved_heights, heights_of
 from .places import satisfying
 

@@ -10,13 +10,9 @@ from typing import Any, cast
 import numpy as np
 import scipy
 from numpy.polynomial.polynomial import polyder, polyval
-from numpy.typing import ArrayLike
 
-from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, ask, is_masked,
-                           require_point, shown)
-from ..core.immutable import cached_property
-from ..core.types import Array, Place
-from ..core.quadrature import hermite_basis
+from ..core import (Array, ArrayLike, CallbackError, InputError, MeshError, NameUnknown, Place, ask,
+                    cached_property, hermite_basis, is_masked, require_point, shown)
 
 EPS = float(np.finfo(float).eps)
 #: A distance outside of elements that have no such point.

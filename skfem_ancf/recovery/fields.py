@@ -21,10 +21,9 @@ from ..beam.points import BeamPoints
 from ..beam.remembered import by_history, remembers
 from ..beam.solid import displacement_strain
 from ..beam.strains import stress_at, stretched
-from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
-                           require_flag, require_integer, require_label, require_text, shown)
-from ..core.linear import first_order, step, stress_of
-from ..core.types import Array
+from ..core import (Array, CallbackError, InputError, NameUnknown, ask, first_order,
+                    require_finite_scalar, require_flag, require_integer, require_label,
+                    require_text, shown, step, stress_of)
 from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from .recovered import Recovery

@@ -12,9 +12,7 @@ import numpy as np
 
 from ..beam.beam import Beam
 from ..beam.domain import drawn
-from ..core.errors import InputError, require_flag, require_integer, require_like, shown
-from ..core.quadrature import tensor
-from ..core.types import Array
+from ..core import Array, InputError, require_flag, require_integer, require_like, shown, tensor
 from .fields import DomainValues, Field, Values, values_on_grid
 
 #: VTK cell numbers by meshio's names.

@@ -34,9 +34,7 @@ from scipy.linalg.lapack import dgttrf, dgttrs, dpttrf, dpttrs
 from ..beam.distribution import AXIS, SNAP
 from ..beam.remembered import remembers
 from ..beam.strains import on_grid, stress_at
-from ..core.immutable import cached_property
-from ..core.linear import angle_of, first_order, largest, unwrapped
-from ..core.types import Array, Law
+from ..core import Array, Law, angle_of, cached_property, first_order, largest, unwrapped
 from ..formulations import EnhancedContinuum
 from ..materials import LinearLaw
 from ..mesh.mapping import cross

@@ -12,10 +12,7 @@ from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.remembered import cable_forces, remembers
 from ..beam.strains import cable_axis, on_grid, stress_at
-from ..core.errors import require_module
-from ..core.linear import angle_of, first_order, unwrapped
-from ..core.quadrature import gauss
-from ..core.types import Array
+from ..core import Array, angle_of, first_order, gauss, require_module, unwrapped
 from ..mesh.mapping import cross
 from .recovered import Recovery
 from .section_forces import ArcLength, Sections

@@ -17,10 +17,7 @@ from numpy.polynomial.chebyshev import chebint, chebvander
 
 from ..beam.beam import Beam
 from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
-from ..core.immutable import cached_property
-from ..core.errors import AncfError
-from ..core.quadrature import gauss, lagrange
-from ..core.types import Array
+from ..core import AncfError, Array, cached_property, gauss, lagrange
 from ..mesh.mapping import MappingBeam, cross
 from ..sections import Layer
 from ..sections.across import EDGE, off_ends, jumps, pieces

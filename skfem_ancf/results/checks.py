@@ -15,8 +15,7 @@ from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
 from ..beam.kinematics import tangents
-from ..core.errors import ModelWarning, StabilityWarning, warn
-from ..core.types import Array
+from ..core import Array, ModelWarning, StabilityWarning, warn
 from ..equations.stability import response
 from ..materials.base import LinearLaw
 from ..recovery.grids import values_of_domain

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.linalg import spsolve
 
-from ..core.errors import InputError, NearMisses, require_finite_scalar, require_index
+from ..core import InputError, NearMisses, require_finite_scalar, require_index
 from ..equations.matrices import linear_external_force, linear_force
 from ..equations.stability import position_weights
 from .state import State

@@ -9,8 +9,7 @@ import numpy as np
 from ..beam.beam import Beam
 from ..beam.domain import Domain
 from ..beam.layout import WhichMember, select_member
-from ..core.errors import AncfError, CallbackError, InputError, require_flag, require_integer
-from ..core.types import Array
+from ..core import AncfError, Array, CallbackError, InputError, require_flag, require_integer
 from ..io import tables, vtu
 from ..recovery.fields import DRAWN, find_field, no_value, values_on_grid
 from ..recovery.grids import layout, values_of_domain

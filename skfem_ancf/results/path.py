@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import require_index
-from ..core.types import Array
+from ..core import Array, require_index
 from ..equations.system import System
 from ..visuals.html import path_html
 from ..visuals.matplotlib import plot_path

@@ -16,8 +16,7 @@ import numpy as np
 from ..beam.beam import Beam
 from ..beam.layout import Layout
 from ..core.archive import output_file
-from ..core.errors import AncfError, require_path, require_text
-from ..core.types import Array, StrPath
+from ..core import AncfError, Array, StrPath, require_path, require_text
 from ..recovery.fields import PRESSURES, units_of
 from ..visuals.diagrams import ROOM, lines_of
 from ..visuals.html import history_picture, picture

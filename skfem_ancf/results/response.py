@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from ..core.errors import InputError, NameUnknown, NearMisses, require_index
-from ..core.types import Array, StrPath
+from ..core import Array, ArrayLike, InputError, NameUnknown, NearMisses, StrPath, require_index
 from ..visuals.matplotlib import dress, new_axes, page
 from ..visuals.scenery import MUTED
 

@@ -21,11 +21,8 @@ from ..beam.distribution import Distribution, Sampled, station_of_node, stations
 from ..beam.domain import Domain, DomainPoints
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
-from ..core.errors import (InputError, NameUnknown, NearMisses, require_flag, require_integer,
-                           shown)
-from ..core.immutable import Immutable, cached_property
-from ..core.linear import first_order, step
-from ..core.types import Array, Place
+from ..core import (Array, Immutable, InputError, NameUnknown, NearMisses, Place, cached_property,
+                    first_order, require_flag, require_integer, shown, step)
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
 from ..equations.system import System

@@ -11,10 +11,8 @@ import numpy as np
 
 from ..actions.joints.nodes import chain_ends
 from ..beam.beam import Beam
-from ..core.errors import (AncfError, ConvergenceError, InputError, ModelWarning, require_integer,
-                           require_option, require_positive, warn)
-from ..core.quadrature import gauss
-from ..core.types import Array
+from ..core import (AncfError, Array, ConvergenceError, InputError, ModelWarning, gauss,
+                    require_integer, require_option, require_positive, warn)
 from ..elements.base import DEGREES
 from ..results.modes import ROUND_OFF, Modes
 from ..results.state import State

@@ -10,9 +10,8 @@ import numpy as np
 
 from ..actions.loads import Load
 from ..beam.layout import WhichBeam, select_beam
-from ..core.errors import (AncfError, InputError, NameUnknown, require_finite_scalar, require_like,
-                           shown)
-from ..core.types import Array
+from ..core import (AncfError, Array, InputError, NameUnknown, require_finite_scalar, require_like,
+                    shown)
 from ..results.report import supports_of
 from ..results.state import State
 from .scene import Scene

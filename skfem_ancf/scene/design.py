@@ -7,14 +7,12 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..actions.bound import derivative
-from ..core.errors import (ConvergenceError, InputError, NameUnknown, ask, ask_array,
-                           require_finite, require_function, require_module, shown)
+from ..core import (Array, ArrayLike, ConvergenceError, InputError, NameUnknown, ask, ask_array,
+                    require_finite, require_function, require_module, shown)
 from ..core.band import NO_FACTORS
-from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
 from ..results.state import State

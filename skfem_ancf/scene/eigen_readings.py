@@ -8,8 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from ..core.errors import InputError, require_flag, require_integer
-from ..core.types import Array
+from ..core import Array, InputError, require_flag, require_integer
 from ..equations.matrices import matrices_of
 from ..equations.strain_tangent import Inverse, StrainTangent
 from ..results.state import State

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..actions.joints.nodes import COMPONENTS, Nodes, chain_ends
 from ..actions.loads import DeadLoad, EndMoment, LineLoad, Load, number_at
@@ -15,10 +14,9 @@ from ..actions.symbols import Symbol, at_node, force_symbol
 from ..beam import Beam, RigidBody
 from ..beam.kinematics import direction
 from ..beam.layout import Layout, WhichBeam, WhichMember
-from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
-                           require_integer, require_names, require_option, require_options,
-                           require_positive, require_unmasked, shown)
-from ..core.types import Array, TimeFunction
+from ..core import (Array, ArrayLike, InputError, TimeFunction, require_finite,
+                    require_finite_scalar, require_function, require_integer, require_names,
+                    require_option, require_options, require_positive, require_unmasked, shown)
 from ..elements import ElementBeam, ElementBeamCable
 from ..formulations import Formulation
 from ..materials import Material

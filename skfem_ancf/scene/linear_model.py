@@ -8,14 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..actions.loads import Load
 from ..beam.points import BeamPoints
-from ..core.errors import InputError, SupportError, require_finite, require_integer
-from ..core.types import Array
+from ..core import Array, ArrayLike, InputError, SupportError, require_finite, require_integer
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
 from ..results.response import FrequencyResponse

@@ -8,7 +8,6 @@ from copy import copy
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
-from numpy.typing import ArrayLike
 
 from ..actions.bound import BoundConstraint, BoundForce
 from ..actions.eigenstrain import EigenStrain, Temperature, require_alone
@@ -28,8 +27,7 @@ from ..actions.supports import Clamp, Pin, Support
 from ..beam import Beam, RigidBody
 from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichMember
-from ..core.errors import InputError, NearMisses, require_text, shown
-from ..core.types import TimeFunction
+from ..core import ArrayLike, InputError, NearMisses, TimeFunction, require_text, shown
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh
 

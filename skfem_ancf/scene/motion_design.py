@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.linalg import lsqr
 
@@ -17,9 +16,8 @@ from ..actions.bound import BoundConstraint, BoundForce, derivative
 from ..actions.loads import Unscaled
 from ..actions.tables import mean_external_force
 from ..beam.kinematics import element_dofs, entries_of
-from ..core.errors import (InputError, NameUnknown, require_flag, require_integer,
-                           require_positive)
-from ..core.types import Array
+from ..core import (Array, ArrayLike, InputError, NameUnknown, require_flag, require_integer,
+                    require_positive)
 from ..dynamics import GeneralizedAlpha, get_scheme
 from ..dynamics.base import Motion, Scheme, in_steps
 from ..dynamics.history import state_of

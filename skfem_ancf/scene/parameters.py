@@ -12,9 +12,8 @@ import scipy
 
 from ..actions.item import Item
 from ..beam.beam import Beam
-from ..core.errors import InputError, NameUnknown, ask_array, require_option, shown
-from ..core.immutable import Immutable, is_builtin, rebuilt
-from ..core.types import Array
+from ..core import (Array, Immutable, InputError, NameUnknown, ask_array, is_builtin, rebuilt,
+                    require_option, shown)
 from ..mesh.mapping import PLACES
 from ..mesh.mesh_beam import MeshBeam
 from ..sections.section import Layers, Profile, Rectangle

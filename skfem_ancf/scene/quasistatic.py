@@ -9,16 +9,13 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..actions.forces.springs import Turns
 from ..actions.obstacles.obstacle import stiffest
-from ..core.errors import (ConvergenceError, InputError, Interrupted, ModelWarning, NameUnknown,
-                           require_finite, require_flag, require_increasing, require_integer,
-                           require_positive, shown, warn)
-from ..core.immutable import Immutable
+from ..core import (Array, ArrayLike, ConvergenceError, Immutable, InputError, Interrupted,
+                    ModelWarning, NameUnknown, require_finite, require_flag, require_increasing,
+                    require_integer, require_positive, shown, warn)
 from ..core.progress import progress_bar
-from ..core.types import Array
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import COLUMNS, History, state_of
 from ..dynamics.sensors import Recorder, Sensor

@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from skfem.assembly import Basis
 
 from ..actions.bound import BoundConstraint, BoundForce
@@ -20,10 +19,9 @@ from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
 from ..beam.masses import projected
-from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, ask, ask_field,
-                           require_finite, require_finite_scalar, require_function, require_label,
-                           require_positive, shown)
-from ..core.types import Array, StrPath
+from ..core import (Array, ArrayLike, ConvergenceError, InputError, Interrupted, NameUnknown,
+                    StrPath, ask, ask_field, require_finite, require_finite_scalar,
+                    require_function, require_label, require_positive, shown)
 from ..dynamics import Scheme, choose_scheme, get_scheme
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History

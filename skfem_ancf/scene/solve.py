@@ -7,9 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, SupportError,
-                           require_finite, require_option)
-from ..core.types import Array
+from ..core import (Array, ConvergenceError, InputError, Interrupted, NameUnknown, SupportError,
+                    require_finite, require_option)
 from ..dynamics.choice import choose_scheme
 from ..dynamics.integrator import OF_STEP
 from ..equations.system import System

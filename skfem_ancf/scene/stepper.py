@@ -6,12 +6,10 @@ from copy import copy
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..actions.forces.springs import Turns
 from ..actions.loads import Amplitude
-from ..core.errors import ConvergenceError, InputError, require_finite
-from ..core.types import Array
+from ..core import Array, ArrayLike, ConvergenceError, InputError, require_finite
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import state_of
 from ..dynamics.run import TimeStepFailed, integrator_of

@@ -11,10 +11,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebinterpolate, chebval
 from numpy.polynomial.legendre import legvander
 
-from ..core.errors import InputError
-from ..core.immutable import Immutable
-from ..core.quadrature import gauss, lagrange
-from ..core.types import Array, Rule
+from ..core import Array, Immutable, InputError, Rule, gauss, lagrange
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..mesh.mesh_beam import MeshBeam

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, NameUnknown
+from ..core import InputError, NameUnknown
 from ..materials.library import LENGTHS
 
 #: Height, width, thickness of web and flange, root radius.

@@ -14,11 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
 
-from ..core.errors import (CallError, InputError, ask_array, require_flag, require_option,
-                           require_positive, shown)
-from ..core.immutable import Immutable
-from ..core.quadrature import gauss
-from ..core.types import Array, Rule
+from ..core import (Array, CallError, Immutable, InputError, Rule, ask_array, gauss, require_flag,
+                    require_option, require_positive, shown)
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..materials.library import LENGTHS

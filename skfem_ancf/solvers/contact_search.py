@@ -23,7 +23,7 @@ import numpy as np
 from ..actions.contact.contacts import Contacts
 from ..actions.contact.contacts import FIRMER, YIELDS
 from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
-from ..core.types import Array
+from ..core import Array
 
 #: Distance of points that are bound at first, and range of the bond, relative to the height.
 NEAR, FAR = 0.5, 1e3

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
-                           require_function, require_integer, require_positive, shown)
+from ..core import (Array, CallbackError, ConvergenceError, InputError, Interrupted, ask,
+                    require_function, require_integer, require_positive, shown)
 from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
-from ..core.types import Array
 from ..equations.convergence import is_balanced, is_small, joint_gap, rules_of
 from ..equations.evaluation import invert
 from ..equations.stability import position_weights

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from ..actions.forces.springs import Turns
 from ..core.band import NO_FACTORS, fix
 from ..core.callbacks import handle_of
-from ..core.types import Array
+from ..core import Array
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
                                    position_weights, potential, verdict)
 from ..equations.system import System

@@ -8,9 +8,8 @@ from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from ..core.band import NO_FACTORS, fix
-from ..core.errors import (ConvergenceError, InputError, ModelWarning, SupportError,
-                           require_integer, warn)
-from ..core.types import Array
+from ..core import (Array, ConvergenceError, InputError, ModelWarning, SupportError,
+                    require_integer, warn)
 from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
 from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import ConvergenceError
+from ..core import Array, ConvergenceError
 from ..core.band import NO_FACTORS
-from ..core.types import Array
 from ..equations import stability
 from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, joint_gap, rules_of
 from ..equations.evaluation import Target

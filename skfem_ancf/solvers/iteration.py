@@ -10,8 +10,7 @@ from ..actions.contact.tables import is_clear
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
-from ..core.source import F1, MADE, apart, indices, source
-from ..core.types import Array
+from ..core import F1, MADE, Array, apart, indices, source
 from ..equations.backend import Backend
 from ..equations.convergence import (CLOSED, FEWEST, NEVER, Rules, diverges, is_balanced,
                                      is_small)

@@ -11,12 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..beam.kinematics import bent
-from ..core.immutable import cached_property
-from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
-                           require_flag, require_integer, require_option, require_positive)
+from ..core import (AncfError, Array, ConvergenceError, InputError, Interrupted, cached_property,
+                    require_finite, require_flag, require_integer, require_option, require_positive)
 from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
-from ..core.types import Array
 from ..equations import stability
 from ..equations.system import System
 from . import descent

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..core.archive import output_file
-from ..core.errors import (InputError, require_flag, require_integer, require_like, require_module,
-                           require_path, require_positive, require_text, shown)
-from ..core.types import StrPath
+from ..core import (InputError, StrPath, require_flag, require_integer, require_like,
+                    require_module, require_path, require_positive, require_text, shown)
 from .matplotlib import FLAT, colormap, colour_bar, dress, figure_class, paint
 from .scenery import INK, MUTED, Scenery
 

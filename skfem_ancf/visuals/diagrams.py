@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..beam.layout import WhichBeam, select_beam
-from ..core.errors import InputError, require_flag, require_like, require_option
-from ..core.types import Array, StrPath
+from ..core import Array, InputError, StrPath, require_flag, require_like, require_option
 from ..recovery.fields import units_of, with_unit
 from ..recovery.grids import grids
 from .matplotlib import dress, new_axes, page

@@ -6,11 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..core.errors import (ConvergenceError, InputError, SupportError, require_finite,
-                           require_finite_scalar, shown)
-from ..core.types import Array
+from ..core import (Array, ArrayLike, ConvergenceError, InputError, SupportError, require_finite,
+                    require_finite_scalar, shown)
 from .pyvista import look, view
 from .scenery import Scenery
 

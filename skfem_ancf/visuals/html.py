@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import AncfError
+from ..core import AncfError
 
 #: Resolution of the pictures, in dots per inch.
 DPI = 80

@@ -6,15 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..actions.obstacles.contact import touching
 from ..actions.obstacles.outlines import AROUND, around
 from ..beam.layout import WhichBeam
 from ..core.archive import output_file
-from ..core.errors import (InputError, require_flag, require_integer, require_like, require_module,
-                           require_option, require_path, require_positive, require_text)
-from ..core.types import StrPath
+from ..core import (ArrayLike, InputError, StrPath, require_flag, require_integer, require_like,
+                    require_module, require_option, require_path, require_positive, require_text)
 from ..recovery.fields import FIELDS, unit_of, units_of
 from ..recovery.grids import layout
 from .scenery import BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, rounded

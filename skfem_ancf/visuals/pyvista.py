@@ -11,9 +11,8 @@ import numpy as np
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
-from ..core.errors import (InputError, require_flag, require_index, require_like,
-                           require_module, require_path, require_text, shown)
-from ..core.types import Array, StrPath
+from ..core import (Array, InputError, StrPath, require_flag, require_index, require_like,
+                    require_module, require_path, require_text, shown)
 from ..recovery.fields import FIELDS, find_fields
 from ..recovery.grids import CELL_TYPES, COMPONENTS, body_of, facts_of, grids, in_space
 from .animation import pixels

@@ -11,9 +11,8 @@ import numpy as np
 
 from ..actions.obstacles.contact import may_touch
 from ..actions.obstacles.outlines import AROUND, around, outlines
-from ..core.errors import (AncfError, InputError, require_finite_scalar, require_flag,
-                           require_positive, require_unmasked, shown)
-from ..core.types import Array
+from ..core import (AncfError, Array, InputError, require_finite_scalar, require_flag,
+                    require_positive, require_unmasked, shown)
 from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_of, units_of,
                                values_on_grid, with_unit)
 from ..recovery.grids import Grid, grids, in_space

@@ -12,8 +12,7 @@ from ..actions.loads import LineLoad, Load, TimedLoad
 from ..actions.places import Vector
 from ..actions.symbols import LOADS, Symbol
 from ..beam.layout import Layout
-from ..core.errors import InputError
-from ..core.types import Array
+from ..core import Array, InputError
 from .scenery import INK, MUTED, rounded, unit_of_resultant
 
 #: Colours of loads and of supports.

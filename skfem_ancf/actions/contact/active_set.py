@@ -5,7 +5,7 @@ The search compares the gap of the middle of each element with the radius of its
 
 import numpy as np
 
-from ...core.source import indices, source
+from ...core import indices, source
 from .gap import distances, middles, places, surface
 from .tables import (ELEMENTS, FRICTION, GAP, LARGEST, MULTIPLIER, RADIUS, RATE, SETTLE, hardening)
 

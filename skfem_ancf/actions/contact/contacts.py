@@ -12,8 +12,7 @@ import numpy as np
 
 from ...core.band import Band
 from ...core.callbacks import handle_of
-from ...core.errors import InputError, shown
-from ...core.types import Array
+from ...core import Array, InputError, shown
 from .active_set import BEYOND, project
 from .crossing import CrossingGuard, middle_of
 from .gap import TINY, places

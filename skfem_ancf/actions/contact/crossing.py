@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.types import Array
+from ...core import Array
 from .gap import outline
 from .poses import taken_back
 from .tables import CUSTOM, STIFFNESS

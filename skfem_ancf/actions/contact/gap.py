@@ -8,7 +8,7 @@ normal at the closest point.
 import numpy as np
 
 from ...core.callbacks import custom_distance
-from ...core.source import F1, F2, I1, apart, indices, source
+from ...core import F1, F2, I1, apart, indices, source
 from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIR, PAIRS, RADIUS, SIDE, START, TINY
 
 #: The least square of a slope: sections have none, and levers of no length.

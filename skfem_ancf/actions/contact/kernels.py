@@ -15,7 +15,7 @@ from typing import Annotated
 import numpy as np
 
 from ...core.band import smallest
-from ...core.source import F1, F2, I1, MADE, apart, indices, source
+from ...core import F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
 from .active_set import near_points, project, search, stride, touching
 from .gap import SHORT, TINY, carried, distances, levers, places, surface

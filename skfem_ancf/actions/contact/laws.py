@@ -14,7 +14,7 @@ Friction is a spring along the surface from an anchor to the point, limited by C
 
 import numpy as np
 
-from ...core.source import source
+from ...core import source
 from .gap import TINY
 
 

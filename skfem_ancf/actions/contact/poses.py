@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.types import Array
+from ...core import Array
 
 
 def carried(pose: Array, x: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 
 from ...core.band import largest
-from ...core.source import F1, F2, I1, MADE, indices, shaped, source
+from ...core import F1, F2, I1, MADE, indices, shaped, source
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)

@@ -7,8 +7,7 @@ from contextlib import nullcontext
 from typing import Any, NamedTuple
 
 from ...beam.layout import Layout
-from ...core.errors import InputError, explained, shown
-from ...core.immutable import is_builtin
+from ...core import InputError, explained, is_builtin, shown
 from ..bound import BoundForce, try_force, user_parts
 from ..item import Item
 from ..places import Vector

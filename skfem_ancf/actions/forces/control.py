@@ -9,9 +9,8 @@ import numpy as np
 
 from ...beam.layout import Layout, WhichBeam
 from ...beam.rigid import RigidBody
-from ...core.errors import (InputError, ask_array, ask_number, require_function, require_option,
-                            require_positive, shown)
-from ...core.types import Array
+from ...core import (Array, InputError, ask_array, ask_number, require_function, require_option,
+                     require_positive, shown)
 from ...mesh.places import is_point
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol

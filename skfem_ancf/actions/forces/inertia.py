@@ -6,14 +6,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ...beam.beam import Beam
 from ...beam.layout import Layout, WhichBeam, WhichMember
-from ...core.errors import (InputError, require_finite, require_finite_scalar, require_not_negative,
-                            shown)
-from ...core.types import Array
+from ...core import (Array, ArrayLike, InputError, require_finite, require_finite_scalar,
+                     require_not_negative, shown)
 from ..item import Item
 from ..places import Vector, point, section
 from ..symbols import Symbol

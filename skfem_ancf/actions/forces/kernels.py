@@ -13,7 +13,7 @@ import numpy as np
 from ...core.band import clear, dot
 from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import ELEMENTS, POSES, call_custom
-from ...core.source import F1, I1, MADE, apart, indices, shaped, source
+from ...core import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_products
 from ..contact.kernels import of_contacts, untouched
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SETTLE,

@@ -14,10 +14,8 @@ from ...beam.kernels.section import beam_gradients
 from ...beam.kinematics import probe_reference
 from ...beam.layout import Layout, WhichBeam, select_beam
 from ...beam.rigid import RigidBody, on_body
-from ...core.errors import (InputError, ask_number, require_finite_scalar, require_flag,
-                            require_function, require_integer, require_not_negative, shown)
-from ...core.quadrature import gauss
-from ...core.types import Array, Place
+from ...core import (Array, InputError, Place, ask_number, gauss, require_finite_scalar,
+                     require_flag, require_function, require_integer, require_not_negative, shown)
 from ...mesh.places import points_of_rows
 from ..item import Item
 from ..loads import EndMoment

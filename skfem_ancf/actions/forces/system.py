@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ...beam.domain import Domain
-from ...core.types import Array
+from ...core import Array
 from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts
 from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...core.errors import require_option
+from ...core import require_option
 from .base import Joint
 from .sliders import OnCircle, OnLine, Sleeve, Slot
 from .weld import (Glue, Hinge, Motor, PlaneSection, PrescribedAngle, PrescribedPosition,

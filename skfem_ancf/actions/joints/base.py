@@ -7,13 +7,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...beam.layout import Layout
 from ...beam.rigid import RigidBody
-from ...core.errors import InputError, explained, require_finite, shown
-from ...core.immutable import is_builtin
-from ...core.types import Array
+from ...core import Array, ArrayLike, InputError, explained, is_builtin, require_finite, shown
 from ...mesh.places import is_point
 from ..bound import (BoundConstraint, at_generic_displacements, require_derivatives,
                      require_entries, user_parts)

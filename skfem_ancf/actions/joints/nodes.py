@@ -13,8 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from ...beam.beam import Beam
 from ...beam.kinematics import direction
 from ...beam.layout import Layout
-from ...core.errors import MeshError, sample
-from ...core.types import Array
+from ...core import Array, MeshError, sample
 from ...mesh.frame_graph import FrameGraph
 from ..places import Vector
 from ..symbols import Symbol, support

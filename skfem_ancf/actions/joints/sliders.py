@@ -7,17 +7,12 @@ from math import factorial, floor
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ...beam.beam import Beam
+from ...beam import Beam, RigidBody
 from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
-from ...beam.rigid import RigidBody
-from ...core.errors import (InputError, require_direction, require_finite, require_flag,
-                            require_label, require_positive, shown)
-from ...core.immutable import array_cache
-from ...core.types import Array
+from ...core import (Array, ArrayLike, InputError, array_cache, hermite_basis, require_direction,
+                     require_finite, require_flag, require_label, require_positive, shown)
 from ...mesh.mapping import cross, turned
-from ...core.quadrature import hermite_basis
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol, tangent_at
 from .base import ComposedJoint, Equation, Joint, aligned, angle_to, distant, rotation

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 from scipy import sparse
 from skfem import BilinearForm
 from skfem.helpers import dot
@@ -18,9 +17,9 @@ from ...beam.kinematics import plane
 from ...beam.layout import Layout, WhichBeam, WhichMember
 from ...beam.points import BeamPoints
 from ...beam.rigid import RigidBody, on_body
-from ...core.errors import (InputError, MeshError, ask_number, require_finite_scalar, require_flag,
-                            require_function, require_label, sample, shown)
-from ...core.types import Array, Place, TimeFunction
+from ...core import (Array, ArrayLike, InputError, MeshError, Place, TimeFunction, ask_number,
+                     require_finite_scalar, require_flag, require_function, require_label, sample,
+                     shown)
 from ...mesh.places import facets_of, is_point, node_of
 from ..item import Item
 from ..loads import EndMoment

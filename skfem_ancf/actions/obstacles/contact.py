@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import InputError, require_index
-from ...core.types import Array
+from ...core import Array, InputError, require_index
 from ..contact.contacts import SEEN
 from ..item import Item
 

@@ -8,10 +8,9 @@ import numpy as np
 
 from ...beam.kernels.section import beam_gradients
 from ...beam.layout import Layout, WhichBeam, select_beam
-from ...core.errors import (InputError, ModelWarning, ask_array, require_function, require_integer,
-                            require_not_negative, require_option, require_positive, shown, warn)
-from ...core.quadrature import gauss_lobatto
-from ...core.types import Array
+from ...core import (Array, InputError, ModelWarning, ask_array, gauss_lobatto, require_function,
+                     require_integer, require_not_negative, require_option, require_positive, shown,
+                     warn)
 from ..contact.contacts import FIRMER, Group
 from ..contact.poses import carried, taken_back
 from ..forces.base import ForceElement, KernelElement

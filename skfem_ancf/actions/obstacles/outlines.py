@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.types import Array
+from ...core import Array
 
 #: Cells along each side of the contour grid.
 CELLS = 160

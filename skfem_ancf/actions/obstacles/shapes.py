@@ -7,13 +7,10 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ...core.errors import (CallbackError, InputError, ask, require_direction, require_finite,
-                            require_flag, require_function, require_not_negative, require_positive,
-                            shown, warnings_as_errors)
-from ...core.immutable import Immutable
-from ...core.types import Array
+from ...core import (Array, ArrayLike, CallbackError, Immutable, InputError, ask, require_direction,
+                     require_finite, require_flag, require_function, require_not_negative,
+                     require_positive, shown, warnings_as_errors)
 from ..contact.gap import outline
 from ..contact.tables import CUSTOM, OUTLINE
 from ..item import takes_time

@@ -9,9 +9,8 @@ from scipy import sparse
 
 from ...beam.beam import Beam
 from ...beam.layout import Layout
-from ...core.errors import (InputError, require_flag, require_label, require_not_negative,
-                            require_positive, shown)
-from ...core.types import Array
+from ...core import (Array, InputError, require_flag, require_label, require_not_negative,
+                     require_positive, shown)
 from ..contact.contacts import SEEN
 from ..contact.laws import mean_pressure, mean_pressure_slope, return_mapping
 from ..forces.base import ForceElement

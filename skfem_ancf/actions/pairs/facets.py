@@ -12,12 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...beam.beam import Beam
+from ...beam import Beam, RigidBody
 from ...beam.kernels.section import beam_gradients
-from ...beam.rigid import RigidBody
-from ...core.errors import InputError
-from ...core.quadrature import gauss_lobatto
-from ...core.types import Array
+from ...core import Array, InputError, gauss_lobatto
 from ..obstacles.obstacle import face_width, lobatto, stiffest
 
 #: Points across the end of a beam.

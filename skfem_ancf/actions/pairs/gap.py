@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.types import Array
+from ...core import Array
 from .facets import Facets
 
 #: Iterations of the projection, its largest step along a facet, and how far it may leave it.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from ...core.types import Array
+from ...core import Array
 from ..contact.tables import weights_of_motion
 from .gap import Surfaces, cross, dot
 

@@ -10,7 +10,7 @@ prevents vectors. So do too many arrays in one loop, whose addresses it compares
 
 import numpy as np
 
-from ...core.source import F1, F2, I1, I2, apart, source
+from ...core import F1, F2, I1, I2, apart, source
 from .compiled import W, CompiledTables
 from .law import LINEAR, conserve, law_evaluate
 from .tables import SECTION

@@ -15,11 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...core.immutable import cached_property
-from ...core.errors import InputError
-from ...core.linear import first_order
-from ...core.quadrature import gauss
-from ...core.types import Array
+from ...core import Array, InputError, cached_property, first_order, gauss
 from ...formulations import Formulation
 from ...materials.history import AtRest
 from ...sections import Across

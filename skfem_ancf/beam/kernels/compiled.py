@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.source import F2, F3, I1, I2
+from ...core import F2, F3, I1, I2
 from .elements import scaled
 from .law import LawTables
 from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, Pattern, StrainTables

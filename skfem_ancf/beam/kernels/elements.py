@@ -19,8 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.immutable import cached_property
-from ...core.types import Array
+from ...core import Array, cached_property
 from .law import LINEAR, conserve, law_evaluate
 from .tables import CABLE, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables
 

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from ...core.immutable import cached_property
-from ...core.types import Array
+from ...core import Array, cached_property
 from .elements import Elements
 from .law import HISTORY, material_of
 from .tables import CABLE, StrainTables

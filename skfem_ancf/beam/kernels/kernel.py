@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.immutable import cached_property
-from ...core.errors import InputError
-from ...core.types import Array
+from ...core import Array, InputError, cached_property
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements

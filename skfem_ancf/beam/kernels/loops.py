@@ -7,7 +7,7 @@ t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and `
 import numpy as np
 
 from ...core.band import add_multiple
-from ...core.source import F1, F2, I1, apart, source
+from ...core import F1, F2, I1, apart, source
 from .blocks import (add, add_forces_of, add_geometric, add_material, add_matrices, at_points,
                      between_samples, block, changes, directions, displaced, from_points, gather,
                      moduli, place, products, put, scale_products, strains, stresses, take, times,

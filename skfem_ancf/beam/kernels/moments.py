@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.source import F1, F2, I1, I3, apart, indices, source
+from ...core import F1, F2, I1, I3, apart, indices, source
 
 TINY = 1e-200
 

@@ -9,7 +9,7 @@ In compiled code the functions of the same names in :mod:`.loops` replace them.
 
 import numpy as np
 
-from ...core.source import primitive
+from ...core import primitive
 from .law import HISTORY, LINEAR
 
 #: Marks kernels with a compiled version.

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.quadrature import product_rule
-from ...core.types import Array
+from ...core import Array, product_rule
 from ...elements.base import ElementBeam
 from ...formulations import Formulation, Term
 from ...mesh.mesh_beam import MeshBeam

@@ -22,9 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.immutable import cached_property
-from ...core.source import F2, F3, I1, I2
-from ...core.types import Array
+from ...core import F2, F3, I1, I2, Array, cached_property
 from .law import LawTables
 
 #: Kinds of strains.
