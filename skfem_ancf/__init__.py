@@ -49,7 +49,7 @@ from .scene.stepper import Stepper
 from .sections import Section
 from .results.modes import Buckling, Modes
 from .sweeps import Sweep, sweep
-from .visuals.explore import Explorer
+from .visuals.pyvista import Explorer
 
 __version__ = "0.1.0"
 

@@ -32,7 +32,7 @@ def pyplot(monkeypatch):
 
 def test_a_demo_runs_and_draws(demo, pyplot, monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skfem_ancf.visuals.animation.FRAMES", 2)
+    monkeypatch.setattr("skfem_ancf.visuals.matplotlib.FRAMES", 2)
     runpy.run_path(str(demo), run_name="__main__")
     figures = [pyplot.figure(number) for number in pyplot.get_fignums()]
     assert figures and all(ax.has_data() for figure in figures for ax in figure.axes)

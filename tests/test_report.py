@@ -10,7 +10,7 @@ from skfem import Basis, ElementQuad2, ElementVector, MeshQuad
 from skfem_ancf import (Beam, Circle, Domain, ElasticPlastic, ElementBeamANCF, ElementBeamCable,
                         FileError, Frame, InputError, MeshBeam, RigidBody, Scene, Section,
                         StVenantKirchhoff)
-from skfem_ancf.results.report import total_force
+from skfem_ancf.results.output import total_force
 
 STEEL = StVenantKirchhoff(2.1e11, 0.3, density=7850, strength=235e6)
 

@@ -15,7 +15,7 @@ LARGER = {
     "dynamics/integrate.py::integrate": "options of a user, each with a default, by keyword",
     "results/state.py::State.__init__": "a record: what a solution is, and where it has it from",
     "solvers/continuation.py::continuation": "options of a user, each with a default, by keyword",
-    "visuals/animation.py::animate": "options of a user, each with a default, by keyword",
+    "visuals/matplotlib.py::animate": "options of a user, each with a default, by keyword",
     "visuals/matplotlib.py::plot_state": "options of a user, each with a default, by keyword",
     "visuals/pyvista.py::view": "options of a user, each with a default, by keyword",
 }

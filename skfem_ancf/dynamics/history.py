@@ -18,14 +18,11 @@ from ..core import (Array, ArrayLike, InputError, Place, StrPath, require_finite
                     shown)
 from ..equations.system import System
 from ..core.progress import progress_bar
-from ..io.tables import to_xarray
-from ..io.vtu import PvdWriter
+from ..io import PvdWriter, to_xarray
 from ..recovery.resultants import Resultants, over_time
-from ..results.report import report_of_history
+from ..results.output import history_html, report_of_history
 from ..results.state import MaterialPoints, Reaction, SpringForces, State
-from ..visuals.animation import animate
-from ..visuals.html import history_html
-from ..visuals.matplotlib import plot_curve, plot_state
+from ..visuals.matplotlib import animate, plot_curve, plot_state
 from ..visuals.pyvista import Series
 from .base import Motion, Scheme
 from .sensors import Readings

@@ -1,20 +1,463 @@
-"""What a state shows: extremes of fields, files, pictures."""
+"""What solutions show: pages of HTML, extremes of fields, files, pictures."""
 
 from __future__ import annotations
 
+import base64
+import html
+import io
+import platform
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from datetime import date
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..beam.beam import Beam
 from ..beam.domain import Domain
-from ..beam.layout import WhichMember, select_member
-from ..core import AncfError, Array, CallbackError, InputError, require_flag, require_integer
-from ..io import tables, vtu
-from ..recovery.fields import DRAWN, find_field, no_value, values_on_grid
+from ..beam.layout import Layout, WhichMember, select_member
+from ..core import (AncfError, Array, CallbackError, InputError, StrPath, require_flag,
+                    require_integer, require_path, require_text)
+from ..core.archive import output_file
+from ..io import save_vtu, to_xarray
+from ..recovery.fields import DRAWN, PRESSURES, find_field, no_value, units_of, values_on_grid
 from ..recovery.grids import layout, values_of_domain
-from ..visuals import diagrams, html, matplotlib, pyvista
-from .report import report
+from ..visuals import diagrams, matplotlib, pyvista
+from ..visuals.diagrams import ROOM, lines_of
+from ..visuals.matplotlib import dress, new_axes, plot_scene
+from ..visuals.scenery import rounded, unit_of_resultant
+from ..visuals.symbols import symbols_of, unit_of_load
+from .checks import has_strength, materials_of
+
+#: Resolution of pictures in notebooks, in dots per inch.
+SCREEN = 80
+
+
+def picture(draw: Callable[[], Any], dpi: int = SCREEN) -> str:
+    """An img element of the figure of ``draw()``; empty if that fails."""
+    try:
+        figure, data = draw().figure, io.BytesIO()
+        figure.savefig(data, format="png", dpi=dpi, bbox_inches="tight")
+    except AncfError:
+        return ""
+    return f'<img src="data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"/>'
+
+
+def _words(text):
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def state_html(state: Any) -> str:
+    """The text of a State, and its picture."""
+    return _words(str(state)) + picture(state.plot)
+
+
+def scene_html(scene: Any) -> str:
+    """A table of the items of a Scene, and its reference configuration."""
+    rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
+    rows += [("rigid body", b) for b in scene.bodies]
+    rows += [("domain", d) for d in scene.domains]
+    rows += [("item", one) for one in scene.items]
+    texts = [(kind, " ".join(repr(thing).split())) for kind, thing in rows]
+    table = "".join(f"<tr><td>{kind}</td><td>" + html.escape(
+        text if len(text) <= 160 else text[:157] + "...") + "</td></tr>" for kind, text in texts)
+    return (_words(repr(scene)[1:-1]) + f"<table>{table}</table>"
+            + picture(lambda: scene.state().plot("displacement", colorbar=False, title="",
+                                                  cmap="Greys")))
+
+
+def path_html(path: Any) -> str:
+    """The text of a Path, and its load against the largest nodal displacement."""
+    def draw():
+        state = path.state(len(path) - 1)
+        beam = max(state.beams, key=lambda b: np.max(np.abs(state.u_of(b))))
+        moved = state.u_of(beam).reshape(-1, beam.nd)[:, :2]
+        node, component = np.unravel_index(np.argmax(np.abs(moved)), moved.shape)
+        return path.plot(beam.mesh.p[:, node], int(component), beam)
+
+    return _words(repr(path)[1:-1]) + picture(draw)
+
+
+def history_html(history: Any) -> str:
+    """The text of a History, and its energies over time."""
+    return _words(repr(history)[1:-1]) + (
+        picture(lambda: history_picture(history)) if len(history) > 1 else "")
+
+
+def history_picture(history: Any) -> Any:
+    """Axes with the energies of a History over time."""
+    ax = new_axes((5.5, 3.0))
+    for name in ("strain", "kinetic", "potential", "total"):
+        ax.plot(history.t, getattr(history, f"{name}_energy"), lw=1.4, label=name)
+    ax.legend(fontsize=8, frameon=False)
+    dress(ax, "energy", "time", "")
+    return ax
+
+
+#: Fields whose largest values are listed, with their units.
+LISTED = {"displacement": "length", "S_xx": "stress", "von_mises": "stress", "utilisation": ""}
+#: Rows of a table at most; instants of a motion that are compared.
+ROWS, INSTANTS = 40, 50
+#: Sum of all forces over the largest of them in an equilibrium.
+BALANCED = 1e-5
+#: Forces that are round-off, relative to the bending stiffness over the squared size.
+NO_FORCE = 1e-9
+#: Decimals of coordinates; section forces relative to the largest of their kind that are zero.
+ROUNDED, ZERO = 12, 1e-12
+#: Resolution of the pictures, in dots per inch.
+DPI = 110
+
+STYLE = """
+@page { size: A4; margin: 15mm }
+body { font: 10pt/1.4 "Helvetica Neue", Arial, sans-serif; color: #222; max-width: 180mm;
+       margin: 10mm auto; padding: 0 4mm }
+h1 { font-size: 17pt; margin: 0 } h2 { font-size: 12pt; margin: 6mm 0 1mm; color: #1f5f8b }
+p { margin: 1mm 0 } .note { color: #666; font-size: 9pt }
+table { border-collapse: collapse; margin: 2mm 0; font-size: 9pt; break-inside: avoid }
+td, th { border-bottom: 1px solid #ccc; padding: 0.6mm 3mm 0.6mm 0; text-align: left;
+         vertical-align: top }
+th { border-bottom: 1.5px solid #222 } td.number { text-align: right; white-space: nowrap }
+img { max-width: 100%; max-height: 68mm; display: block; margin: 2mm auto }
+h2 { break-after: avoid } h2, figure { break-inside: avoid } figure { margin: 0 }
+.tall img { max-height: 160mm }
+.bad { color: #b3261e }
+@media print { body { margin: 0; padding: 0; max-width: none } }
+"""
+
+
+def report(state: Any, filename: StrPath, title: str | None = None) -> Path:
+    """Write a page of HTML about the solution: to read, to print, to send; returns its path.
+
+    The page contains the pictures and needs no other file. It has the model with its sizes,
+    materials, loads and supports; reactions and their balance; extremes of displacement, stress,
+    utilisation and section forces, and where they are; diagrams; findings, and versions. Units are
+    those of :meth:`Scene.units <skfem_ancf.Scene.units>`. Printed it is two to four A4 pages.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.State`.
+    filename
+        Ends with .html; missing folders are created.
+    title
+        Title of the page; by default the name of the file.
+
+    Examples
+    --------
+    >>> from skfem_ancf import Frame, StVenantKirchhoff
+    >>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3, density=7850, strength=235e6)
+    >>> frame = Frame.from_lines([(0, 0), (4, 0)], [(0, 1)], material=steel, height=0.2, width=0.1)
+    >>> state = frame.units("N", "m").pin(0).hold(1, "y").line_load((0, -1e4)).solve_static()
+    >>> state.report("girder.html").name  # doctest: +SKIP
+    'girder.html'
+    """
+    path = require_path("filename", filename, (".html", ".htm"))
+    title = require_text("title", title)
+    return _written(path, path.stem if title is None else title, _Page(state).parts())
+
+
+def report_of_history(history: Any, filename: StrPath, title: str | None = None) -> Path:
+    """Write a page of HTML about a motion or run: :meth:`State.report
+    <skfem_ancf.State.report>` of its instant of largest utilisation, or displacement; returns its
+    path.
+
+    It begins with the energies and sensors over time.
+
+    Parameters
+    ----------
+    history
+        A :class:`~skfem_ancf.History`.
+    filename, title
+        As for a State.
+    """
+    path = require_path("filename", filename, (".html", ".htm"))
+    title = require_text("title", title)
+    chosen = np.unique(np.linspace(0, len(history) - 1, min(len(history), INSTANTS)).astype(int))
+    states = list(history.states(chosen.tolist()))
+    strong = has_strength(states[0])
+    size = [one.extremes("utilisation" if strong else "displacement", 1)[0].value
+            for one in states]
+    state = states[int(np.argmax(size))]
+    about = (f"t = {history.t[0]:g} to {history.t[-1]:g}, {history.steps} steps by "
+             f"{history.scheme!r}. What follows is the instant t = {state.t:g}, of the largest "
+             f"{'utilisation' if strong else 'displacement'} of {len(chosen)} instants.")
+    sensors = [_figure(lambda name=name: history.plot_curve("t", name, xlabel="time"))
+               for name, values in history.sensors.items() if values.ndim == 1]
+    parts = ["<h2>Motion</h2>", _text(about), _figure(lambda: history_picture(history)), *sensors]
+    return _written(path, path.stem if title is None else title, [*parts, *_Page(state).parts()])
+
+
+def _written(path, title, parts):
+    name = html.escape(title)
+    page = (f"<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
+            f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
+            f"<style>{STYLE}</style></head>\n<body><h1>{name}</h1>\n" + "\n".join(
+                part for part in parts if part) + "\n</body></html>\n")
+    with output_file(path) as temporary:
+        Path(temporary).write_text(page, encoding="utf-8")
+    return path
+
+
+def _text(text, kind=""):
+    return f"<p class='{kind}'>{html.escape(text)}</p>"
+
+
+def _figure(draw, kind=""):
+    found = picture(draw, DPI)
+    return f"<figure class='{kind}'>{found}</figure>" if found else ""
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A table; numbers are tuples of one text."""
+    rows = list(rows)
+    cells = ["".join(f"<td class='number'>{html.escape(c[0])}</td>" if isinstance(c, tuple) else
+                     f"<td>{html.escape(str(c))}</td>" for c in row) for row in rows[:ROWS]]
+    more = _text(f"and {len(rows) - ROWS} more", "note") if len(rows) > ROWS else ""
+    return "" if not rows else (
+        "<table><tr>" + "".join(f"<th>{html.escape(h)}</th>" for h in head) + "</tr>"
+        + "".join(f"<tr>{row}</tr>" for row in cells) + f"</table>{more}")
+
+
+def total_force(system: Any, u: Array, force: Array) -> Array:
+    """Resultant of a force on the DOFs (N,) and its moment about the origin, (3,)."""
+    out = np.zeros(3)
+    for member, s in zip(system.members, system.slices):
+        f, q = force[s], (member.q0 + u[s]).reshape(-1, 2)
+        out[:2] += member.rigid_motions()[:, :2].T @ f
+        f = f.reshape(-1, 2)
+        out[2] += np.sum(q[:, 0] * f[:, 1] - q[:, 1] * f[:, 0])
+    return out
+
+
+def supports_of(state: Any) -> Iterator[tuple[str, tuple[float, float, float]]]:
+    """Places of supports, and their reactions along x, along y, and moment."""
+    system, known = state.system, set[str]()
+    if (frame := system.constraints.frame) is not None:
+        for node in np.flatnonzero(np.any(frame.fixed, axis=1)).tolist():
+            found = state.reactions(node)
+            yield f"node {node} at {_pair(frame.graph.points[:, node])}", (
+                *found.force, found.moment)
+    layout = Layout(*system.members)
+    for item in system.items:
+        symbols = [s for one in item.expand(layout) for s in one.symbols(layout)
+                   if s.kind == "support"]
+        if not symbols or not hasattr(item, "boundary"):
+            continue
+        try:
+            found = state.reactions(item.boundary, item.beam)
+        except AncfError:
+            continue
+        member = layout.beam(item.beam)
+        place = (f"{_pair(symbols[0].at[0].start)} of {'beam ' * isinstance(member, Beam)}"
+                 f"{name_of(system, member)}")
+        if place not in known:
+            known.add(place)
+            yield place, (*found.force, found.moment)
+
+
+def name_of(system: Any, member: Any) -> str:
+    """Name or number of a member."""
+    return str(system.members.index(member)) if member.name is None else member.name
+
+
+class _Page:
+    """The parts of the page of a state."""
+
+    def __init__(self, state: Any) -> None:
+        self.state, self.system = state, state.system
+        self.units = units_of(state)
+        self.strong = has_strength(state)
+
+    def number(self, value: float, kind: str = "") -> tuple[str]:
+        """A number with the unit of a length, force, moment or stress, as a cell."""
+        force, length = self.units or ("", "")
+        unit = "" if self.units is None else {
+            "length": length, "force": force, "moment": f"{force} {length}",
+            "stress": PRESSURES.get(self.units, f"{force}/{length}²"), "": ""}[kind]
+        return (rounded(value + 0.0, unit),)
+
+    def parts(self) -> list[str]:
+        """All sections of the page."""
+        from importlib.metadata import version
+
+        state = self.state
+        how = ("linear, for small displacements" if state.base is not None else
+               f"instant t = {state.t:g}{' of a motion' * bool(np.any(state._inertia))}"
+               if state.t is not None else
+               f"equilibrium for large displacements: {state.verdict}")
+        units = "" if self.units is None else f" Units: {', '.join(self.units)}."
+        start = state.replace(u=np.zeros_like(state.u), load=0.0, t=None)
+        model = _figure(lambda: plot_scene(start, names=len(self.system.members) > 1))
+        findings = state.checks.findings
+        return [
+            _text(f"{how[0].upper()}{how[1:]}. Load factor {state.load:g}.{units}"),
+            "<h2>Model</h2>", model, self._bodies(), self._materials(),
+            "<h2>Loads and supports</h2>", self._actions(),
+            "<h2>Reactions</h2>", self._reactions(),
+            "<h2>Results</h2>", self._extremes(), *(
+                _figure(partial(state.plot, field, scale="auto")) for field in (
+                    "displacement", "utilisation" if self.strong else "von_mises")),
+            _table(("utilisation", "at", "of"), [
+                ((f"{one.value:.3f}",), _pair(one.point), str(one.beam))
+                for one in state.extremes()]) if self.strong else "",
+            "<h2>Section forces</h2>" if state.beams else "", self._section_forces(),
+            *self._integrated(),
+            "<h2>Findings</h2>", *([_text(text, "bad") for text in findings]
+                                   or [_text("None: the solution is within the range of its mesh "
+                                             "and materials.")]), *self._recovered(),
+            _text(f"skfem-ancf {version('skfem-ancf')}, scikit-fem {version('scikit-fem')}, NumPy "
+                  f"{np.__version__}, SciPy {version('scipy')}, Python "
+                  f"{platform.python_version()}. {self.system.N} degrees of freedom. "
+                  f"{date.today().isoformat()}", "note")]
+
+    def _bodies(self):
+        rows = []
+        for beam in self.state.beams:
+            mesh, weighs = beam.mesh, all(layer.density is not None
+                                          for layer in beam.across.layers)
+            length = self.number(float(np.sum(mesh.lengths)), "length")
+            rows.append((name_of(self.system, beam), length, self.number(mesh.height, "length"),
+                         str(beam.section).strip("<>"),
+                         f"{mesh.nelements} × {type(beam.element).__name__}",
+                         (f"{beam.total_mass:.4g}",) if weighs else "–"))
+        others = [(name_of(self.system, one), repr(one).strip("<>"))
+                  for one in self.system.members[len(rows):]]
+        return _table(("beam", "length", "height", "section", "elements", "mass"), rows) + _table(
+            ("body", ""), others)
+
+    def _materials(self):
+        def cell(value, kind):
+            return "–" if value is None else "f(x, y)" if callable(value) else (
+                self.number(value, kind))
+
+        def strength(given):
+            return "–" if given is None else (" / ".join(
+                self.number(x, "stress")[0] for x in given),) if isinstance(given, tuple) else (
+                    self.number(given, "stress"))
+
+        every = dict.fromkeys(one for member in self.system.members for one in materials_of(member))
+        return _table(("material", "E", "ν", "density", "strength"), [
+            (f"{getattr(m, 'title', '') or type(m).__name__}, plane {m.plane}",
+             cell(grade or m.E, "stress"), (f"{m.nu:g}",), cell(density, ""), strength(m.strength))
+            for m, grade, density in every])
+
+    def _actions(self):
+        rows = []
+        for s in symbols_of(self.state, True, True, True):
+            x, (a, b) = s.at[len(s.at) // 2].start, s.direction[0]
+            place = "" if s.kind in ("weight", "drag") else f"({x[0]:.4g}, {x[1]:.4g})"
+            if s.kind in ("support", "joint"):
+                rows.append((s.kind, place, s.text.replace(" ", ", ") or "fixed", ""))
+                continue
+            way = f"direction ({a:.3g}, {b:.3g})" if s.kind in ("force", "weight") else ""
+            if len(s.at) > 1:
+                place = f"from {_pair(s.at[0].start)} to {_pair(s.at[-1].start)}"
+            value = (rounded(s.value + 0.0, unit_of_load(s, self.units)),) if s.kind in (
+                "force", "moment", "weight", "mass") else ""
+            rows.append(("distributed force" if s.per else s.kind, place,
+                         f"{s.text.removesuffix('= ')} {way}".strip(), value))
+        for one in self.system.forces.contacts.obstacles:
+            rows.append(("obstacle", "", repr(one.shape).strip("<>") + ", moves" * one.moves,
+                         (f"friction {one.friction:g}",) if one.friction else ""))
+        rows.sort(key=lambda row: row[0] in ("support", "joint"))
+        return _table(("what", "where", "", "value"), dict.fromkeys(rows))
+
+    def _reactions(self):
+        """Forces of supports, and the balance of all forces."""
+        state, system, u = self.state, self.system, self.state._acted
+        reactions = list(supports_of(state))
+        rows = [(place, *self._forces(*force)) for place, force in reactions]
+        support = state._support_force()
+        inertia, internal = state._inertia + np.zeros_like(u), state.internal_force
+        joints = np.zeros_like(u) if not system.constraints.joints else (
+            state.multipliers @ system.constraints.full_jacobian(u, state._time))
+        parts = {"loads": internal + inertia + joints - support,
+                 "supports": np.where(system.constraints.free, 0.0, support) - joints,
+                 "springs, obstacles, foundations": -internal, "inertia and damping": -inertia}
+        totals = {name: total_force(system, u, force) for name, force in parts.items()}
+        every = [*totals.values(), *(force for _, force in reactions)]
+        largest = max(np.max(np.abs(one[:2])) for one in every)
+        size = largest or 1.0
+        length = float(np.max(np.ptp(np.hstack([b.mesh.p for b in state.beams]), axis=1))
+                       ) if state.beams else 1.0
+        shown = [(name, *self._forces(*one)) for name, one in totals.items()
+                 if name in ("loads", "supports") or np.max(
+                     np.abs(one / [1, 1, length])) > 1e-9 * size]
+        rest = sum(totals.values())
+        error = max(np.max(np.abs(rest[:2])), abs(rest[2]) / length) / size
+        least = NO_FORCE * min((float(np.min(b.across.bending)) for b in state.beams),
+                               default=0.0) / length**2
+        balance = _text("No forces act on the structure.", "note") if largest <= least else _text(
+            f"The sum of all forces on the structure is {error:.1g} of the largest of them." + (
+                " They are in balance." if error < BALANCED else "" if state.t is None else
+                " The schemes of motions balance forces on average over a step."),
+            "note" if error < BALANCED or state.t is not None else "bad")
+        head = "along x", "along y", "moment"
+        return _table(("support", *head), rows) + _table(
+            ("all forces, moments about the origin", *head), shown) + balance
+
+    def _forces(self, x, y, moment):
+        return self.number(x, "force"), self.number(y, "force"), self.number(moment, "moment")
+
+    def _extremes(self):
+        rows = []
+        for field, kind in LISTED.items():
+            # of all beams, and of each domain
+            for group in (self.state.beams, *([domain] for domain in self.system.domains)):
+                every = []
+                for b in group:
+                    with suppress(AncfError):  # a law without this stress, or without strength
+                        every += self.state.extremes(field, 1, beam=b)
+                if every:
+                    one = max(every, key=lambda e: abs(e.value))
+                    rows.append((f"largest {field.replace('_', ' ')}", self.number(one.value, kind),
+                                 _pair(one.point), str(one.beam)))
+        return _table(("", "value", "at", "of"), rows)
+
+    def _section_forces(self):
+        if not self.state.beams:
+            return ""
+        lines, rows = lines_of(self.state, self.state.beams), []
+        size = {name: max(np.max(np.abs(one[name])) for one in lines) for name in "NQM"}
+        size["N"] = size["Q"] = max(size["N"], size["Q"])
+        for name in "NQM":
+            unit = unit_of_resultant(name, self.units)
+            for what, pick in (("maximum", np.argmax), ("minimum", np.argmin)):
+                line = lines[int(pick([one[name][pick(one[name])] for one in lines]))]
+                k = int(pick(line[name]))
+                value = float(line[name][k])
+                value *= abs(value) > ZERO * size[name]
+                rows.append((f"{what} {name}", (rounded(value + 0.0, unit),),
+                             _pair(line["x"][:, k]), name_of(self.system, line["beam"])))
+        points = np.hstack([line["x"] for line in lines])
+        width, height = np.ptp(points, axis=1) + 2.0 * ROOM * np.max(np.ptp(points, axis=1))
+        beside = height > width
+        size = (7.0, 4.5) if beside else (6.3, min(9.5, 3.0 * (6.3 * height / width + 0.55)))
+        axes = new_axes(size, *((1, 3) if beside else (3, 1)))
+        return _figure(lambda: self.state.plot_resultants(axes=axes, on="structure")[0], "tall"
+                       ) + _table(("", "value", "at", "beam"), rows)
+
+    def _integrated(self):
+        """Notes on section forces that are not those of equilibrium."""
+        for k, (name, why) in enumerate(self.state.recovered.items()):
+            if why and self.state._recovery_of(k, fields=False) is None:
+                yield _text(f"Section forces of beam {name} are integrals of the stress of its "
+                            f"elements, with its errors: {why}." + (
+                                " The exact ones are zero." if why.endswith("no load") else ""),
+                            "note")
+
+    def _recovered(self):
+        for name, why in self.state.recovered.items():
+            if why:
+                yield _text(f"Stress of beam {name} is that of its elements: {why}.", "note")
+
+
+def _pair(x):
+    x, y = np.round(x, ROUNDED) + 0.0
+    return f"({x:.4g}, {y:.4g})"
+
 
 #: Points of all beams together, along an element at least and at most, and across it.
 POINTS, FEW, MANY, ACROSS = 4000, 4, 32, 8
@@ -127,9 +570,9 @@ class Output:
             raise undefined
         return [one for one, _ in sorted(found, key=lambda pair: -pair[1])[:count]]
 
-    _repr_html_ = html.state_html
-    save = vtu.save_vtu
-    to_xarray = tables.to_xarray
+    _repr_html_ = state_html
+    save = save_vtu
+    to_xarray = to_xarray
     to_pyvista = pyvista.to_pyvista
     view = pyvista.view
     plot = matplotlib.plot_state

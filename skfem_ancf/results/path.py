@@ -10,8 +10,8 @@ import numpy as np
 
 from ..core import Array, require_index
 from ..equations.system import System
-from ..visuals.html import path_html
 from ..visuals.matplotlib import plot_path
+from .output import path_html
 from .state import MaterialPoints, State
 
 

@@ -12,7 +12,7 @@ from ..actions.loads import Load
 from ..beam.layout import WhichBeam, select_beam
 from ..core import (AncfError, Array, InputError, NameUnknown, require_finite_scalar, require_like,
                     shown)
-from ..results.report import supports_of
+from ..results.output import supports_of
 from ..results.state import State
 from .scene import Scene
 

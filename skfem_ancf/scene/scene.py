@@ -32,14 +32,14 @@ from ..equations.matrices import (SceneMatrices, linear_external_force, linear_f
 from ..equations.system import System
 from ..results.checks import warn_of, warn_of_points
 from ..results.modes import Buckling, Modes
+from ..results.output import scene_html
 from ..results.path import CriticalPoint, Path
 from ..results.response import FrequencyResponse
 from ..results.state import State
 from ..solvers import continuation, eigen, newton
 from ..solvers.continuation import Point
-from ..visuals.explore import Explorer, explorer
-from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
+from ..visuals.pyvista import Explorer, explorer
 from .adapt import DEGREES, GOALS, MOST_ELEMENTS, frequency_errors, solve_adaptive
 from .design import Gradient
 from .linear_model import LinearModel
