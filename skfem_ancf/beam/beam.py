@@ -234,12 +234,6 @@ class Beam(Immutable):
         return read_only(_coordinates(self.mesh, self.element,
                                       self.mesh.p - self.origin[:, None]))
 
-    @cached_property
-    def _turned_back(self):
-        """Conjugate turns of the axis over the elements in the reference, complex, (ne,)."""
-        _, slopes = kinematics.ends(self, self.q0_local)
-        return slopes[0] * slopes[1].conj()
-
     @property
     def dofnames(self) -> list[str]:
         """Names of the DOFs of a node: r^1, r^2, r_X^1, ..."""

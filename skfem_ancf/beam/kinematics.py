@@ -182,16 +182,15 @@ def tangents(beam: Any, u: Array | float) -> Array:
     return (beam.q0_local + u).view(complex)[1::beam.nd // 2]
 
 
-def ends(beam: Any, q: Array) -> tuple[Array, Array]:
-    """Positions and derivatives r_X at both ends of each element, complex, of coordinates (N,)."""
-    both = q.view(complex).reshape(-1, beam.nd // 2)[beam.mesh.t]
-    return both[..., 0], both[..., 1]
-
-
 def bent(beam: Any, u: Array) -> tuple[float, bool]:
     """Largest rotation of the axis over an element, and True if it folds back within one. Then a
     chord is opposite to a tangent at its end."""
-    (left, right), slopes = ends(beam, beam.q0_local + u)
-    back = (right - left).conj() * slopes
-    turn = slopes[1] * slopes[0].conj() * beam._turned_back
-    return (float(abs(np.arctan2(turn.imag, turn.real)).max()), bool(back.real.min() < 0.0))
+    axis, t = beam.q0_local.reshape(-1, beam.nd // 2, 2)[:, :2], beam.mesh.t
+    r, slope = (axis + u.reshape(axis.shape[0], -1, 2)[:, :2])[t].view(complex)[..., 0].transpose(
+        2, 0, 1)
+    turn = slope[1] * slope[0].conj()
+    if not beam.mesh.is_straight:
+        before = axis[t].view(complex)[:, :, 1, 0]
+        turn *= before[0] * before[1].conj()
+    back = ((r[1] - r[0]).conj() * slope).real
+    return float(np.abs(np.arctan2(turn.imag, turn.real)).max()), bool(back.min() < 0.0)

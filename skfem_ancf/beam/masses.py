@@ -109,11 +109,13 @@ def _of_cable(beam):
     n = points_along(beam)
     xi, w = gauss(n)
     tind = np.array([0]) if across.uniform else None
-    mass, first, second = across.moments(xi, tind, "mass") * w
+    moments = across.moments(xi, tind, "mass")
     if beam.mesh.is_straight and beam.element.by_reference:
         length = beam.mesh.lengths[slice(None) if tind is None else tind, None]
         N, d_xi = _at_gauss(beam.element, n) * beam.element.powers(1.0, length).T[:, :, None]
-        return Masses(N, mass * length, d_xi / length, np.array([first, second]) * length)
+        moments *= w * length
+        return Masses(N, moments[0], d_xi / length, moments[1:])
+    mass, first, second = moments * w
     X = np.array([xi, 0.5 + 0.0 * xi])
     N, d_xi, _ = beam.element.of_mesh(mapping, X, tind)
     # arc length, since the interpolated tangent is shorter than one

@@ -306,13 +306,13 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
 FARTHEST = 1e100
 
 
-def require_moderate(name: str, array: Array) -> Array:
-    """Coordinates of which squares and products do not overflow."""
-    largest = np.abs(array).max(initial=0.0)
+def require_moderate(name: str, array: Array) -> float:
+    """The largest magnitude of coordinates of which squares and products do not overflow."""
+    largest = float(np.abs(array).max(initial=0.0))
     if largest > FARTHEST or 0.0 < largest < 1.0 / FARTHEST:
         raise InputError(f"{name} must have coordinates between {1.0 / FARTHEST:g} and "
                          f"{FARTHEST:g}, got {largest:g}")
-    return array
+    return largest
 
 
 def require_direction(name: str, value: Any) -> Array:

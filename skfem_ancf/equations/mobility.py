@@ -25,6 +25,8 @@ MOVED = 3e-3
 CLOSED = 1e-10
 #: Largest number of Newton corrections.
 CORRECTIONS = 12
+#: Relative lever of a support that prevents a rotation for certain.
+HELD = 1e-3
 
 
 def repeated(constraints: Any) -> tuple[Array | None, bool]:
@@ -157,6 +159,8 @@ def free_rigid_motions(constraints: Any, joints: Any,
     ``joints`` is the Jacobian (m, N) in the reference configuration; ``stiffness`` returns the
     sparse stiffness of force elements there, or is None."""
     c = constraints
+    if len(c.members) == 1 and _held(c):
+        return []
     motions, of_joints, bodies = _motions(c, joints)
     parts = [motions[c.fixed], of_joints]
     if stiffness is not None:
@@ -168,6 +172,17 @@ def free_rigid_motions(constraints: Any, joints: Any,
     free = null_space(unit_rows(np.concatenate(parts) if dense else sparse.vstack(parts)))
     bodies = bodies() if len(free) else []
     return [_describe(v, bodies) for v in free]
+
+
+def _held(c):
+    """True if supports hold a node of the only member, and something that turns about it."""
+    (member,), held, sizes = c.members, set(c.fixed.tolist()), c.coordinate_sizes
+    node = next((d for d in held if d % member.nd == 0 and d + 1 in held), None)
+    if node is None:
+        return False
+    q = member.q0_local
+    return any(abs(q[d ^ 1] - (q[node + (d ^ 1) % 2] if d % member.nd < 2 else 0.0)) > HELD * sizes[d]
+               for d in held)
 
 
 def _motions(c, joints):

@@ -153,7 +153,8 @@ class FrameGraph:
                  curves: Mapping[int, Callable[[Array], Any]] | None = None,
                  tol: float | None = None, beams: Sequence[str] | None = None,
                  lost: Mapping[str, int] | None = None) -> None:
-        self.points = require_moderate("points", _pairs("points", points).astype(float))
+        self.points = _pairs("points", points).astype(float)
+        require_moderate("points", self.points)
         ends = _pairs("lines", lines)
         if np.any(ends != np.floor(ends)):
             raise InputError(f"lines are numbers of points, got {shown(lines)}")

@@ -265,16 +265,23 @@ class MeshBeam(NumberedMesh):
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
         made, (height, heights, taper) = object.__new__(cls), heights
-        tangent = tangent + np.zeros(p.shape)
+        zero, size = np.zeros(p.shape), require_moderate("the nodes", p)
+        tangent = tangent + zero
         # without __post_init__, which checks the shapes and numbers of given arrays
         vars(made).update(
-            doflocs=require_moderate("the nodes", p), t=t, _boundaries=default_tags(p, t),
-            _subdomains=None, height=height, p_X=tangent, lengths=lengths, s=s, curve=curve,
+            doflocs=p, t=t, _boundaries=default_tags(p, t), _subdomains=None, height=height,
+            p_X=tangent, lengths=lengths, s=s, curve=curve,
             p_Y=np.array([0.0 - tangent[1], tangent[0]]), heights=heights, taper=taper,
-            p_XY=np.zeros(p.shape) if turning is None else turning)
+            p_XY=zero if turning is None else turning)
+        least, most, noise = lengths.min(), lengths.max(), 8 * EPS * size
         if curve is None:
-            vars(made)["is_straight"] = True
-        made._check()
+            # the round-off of the nodes' positions is no difference in length
+            vars(made).update(is_straight=True, is_uniform=heights is None and bool(
+                most - least <= 1e-13 * most + noise))
+            for array in (p, t, tangent, lengths, made.p_Y, zero, s):  # they need no copies
+                array.flags.writeable = False
+        if curve is not None or heights is not None or least <= 2.0 * noise or not least * height:
+            made._check()
         Immutable._freeze(made)
         return made
 
@@ -283,7 +290,8 @@ class MeshBeam(NumberedMesh):
         return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
 
     def __post_init__(self):
-        p = require_moderate("the nodes", require_finite("the nodes", self.doflocs, (2, None)))
+        p = require_finite("the nodes", self.doflocs, (2, None))
+        require_moderate("the nodes", p)
         if type(self.t) is not np.ndarray or self.t.dtype != np.int32:
             t = require_finite("t", self.t)
             if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
@@ -405,7 +413,10 @@ class MeshBeam(NumberedMesh):
 
     @cached_property
     def _own_mapping(self):
-        return MappingBeam(self)
+        # with the mesh itself, its memory would wait for a garbage collection
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self))
+        return MappingBeam(twin)
 
     def _mapping(self):
         return self._own_mapping

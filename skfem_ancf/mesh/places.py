@@ -129,9 +129,10 @@ class Finder:
                 h = self.mesh.height if self.mesh.heights is None else (
                     self.mapping.height(xi[:, None], e)[0][:, 0])
                 X = np.array([xi, 0.5 + across / h])
-                outside = self._outside(X, noise)
-                outside[outside > 1.0] = np.inf
-                return e, np.minimum(np.maximum(X, 0.0), 1.0), outside, np.zeros(n, dtype=bool)
+                outside = np.abs(X - 0.5).max(axis=0) - 0.5
+                outside[outside < noise] = 0.0
+                outside[~(outside <= 1.0)] = np.inf
+                return e, X.clip(0.0, 1.0), outside, np.zeros(n, dtype=bool)
             if chain is not None or not self.is_chain:
                 return self._best(x, noise, *self._pairs(x, chain))
             found = self._best(x, noise, np.arange(n), self._tree.query(x.T)[1] // SAMPLES)
@@ -237,8 +238,8 @@ class Finder:
         """Tangent and normal of a single straight line, and where it and its elements begin; or
         None."""
         mesh, first = self.mesh, self.mesh.p[:, :1]
-        if not (mesh.is_straight and self.is_chain
-                and np.abs(mesh.p_X - mesh.p_X[:, :1]).max() < 1e-9):
+        if not (self.is_chain and (mesh.is_uniform or mesh.is_straight and np.abs(
+                mesh.p_X - mesh.p_X[:, :1]).max() < 1e-9)):
             return None
         d = np.array([mesh.p_X[:, 0], mesh.p_Y[:, 0]])
         return d, first, d[0] @ (mesh.p[:, :-1] - first)

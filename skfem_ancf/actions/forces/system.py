@@ -85,13 +85,25 @@ class Forces:
     _in_border = NONE > 0
     border_entries = _entries
     _border: Any = NONE, NONE
+    #: Of a scene without elements.
+    masses: Any = ()
+    elements = custom = changing = remembering = parts = _springs = _blocks = _slices = masses
+    rows = size = 0
+    distant = couples_far = resists = False
+    symmetric = True
+    contacts = Contacts((), 0)
+    #: Entries of the last tangent of a step: rows, columns and values.
+    kept: Any = NONE, NONE, np.zeros(0)
 
     def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
-        self.masses: list[Any] = [e for e in elements if e.mass_entries() is not None]
+        self._N, self._bandwidth, self.border_rows = N, bandwidth, np.zeros((0, N))
+        if not elements:
+            self.clear = np.zeros(SEEN + 2 * N)
+            return
+        self.masses = [e for e in elements if e.mass_entries() is not None]
         self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
                          for e in elements]
-        self._N, self._bandwidth = N, bandwidth
         parts: list[KernelElement] = []
         self.custom, self.changing = [], []
         for element in self.elements:
@@ -126,7 +138,7 @@ class Forces:
             self._slices.append((slice(row, row + m), slice(at, at + len(a))))
             blocks.append((element.links, row + np.arange(m), a, b, numbers))
             row, at = row + m, at + len(a)
-        self.rows, self.size, self.border_rows = row, at, np.zeros((0, N))
+        self.rows, self.size = row, at
         if blocks:
             self._couple(blocks, places)
         weights = np.zeros(N)
@@ -136,8 +148,6 @@ class Forces:
         self.clear, u = clear_table(weights), np.zeros(N)
         if self.changing:
             set_clear(self.clear, u, self._least_gap(u))
-        #: Entries of the last tangent of a step: rows, columns and values.
-        self.kept = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
         self.distant = bool(self._in_border.any())
         self.couples_far = self.distant or bool(self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
@@ -361,7 +371,8 @@ class Forces:
 
     def corrected(self, u: Array, t: float) -> bool:
         """Change histories with which an increment is to be repeated; True if there are any."""
-        return sum(element.correct(u, t) for element in self._at_work(u)) > 0
+        return bool(self.remembering) and sum(
+            element.correct(u, t) for element in self._at_work(u)) > 0
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
         """Why a step must not lead from a displacement and time to others, or None."""

@@ -15,9 +15,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...core import Array, InputError, cached_property, first_order, gauss
+from ...core import Array, InputError, first_order, gauss
 from ...formulations import Formulation
-from ...materials.history import AtRest
+from ...materials.history import HistoryMaterial
 from ...sections import Across
 from .kernel import ElementKernel, strains
 from .histories import fibres
@@ -96,11 +96,9 @@ class CableKernel(ElementKernel):
         self.points, self._across = self._rule[0], across
         self.points_number = len(self.points)
         same = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * mesh.lengths.max()
-        laws = [layer.material.law() for layer in across.layers]
-        if any(isinstance(law, AtRest) for law in laws):
-            self.tables = self._with_fibres(mesh, element, same)
-        else:
-            self.tables = [self._table(mesh, element, same)]
+        history = any(isinstance(layer.material, HistoryMaterial) for layer in across.layers)
+        self.tables = (self._with_fibres(mesh, element, same) if history else
+                       [self._table(mesh, element, same)])
 
     def _table(self, mesh, element, same):
         """Tables of the reference element scaled by the lengths, for one or all elements."""
@@ -114,7 +112,10 @@ class CableKernel(ElementKernel):
             self.points, np.zeros(1, int) if same and self._across.constant else None)
         moduli = [EA, EI, -ES] if ES.any() else [EA, EI]
         pattern, order = _samples(n, len(moduli))
-        H = (np.concatenate([x * w for x in moduli], axis=1) * L)[:, order]
+        H = np.concatenate([x * w for x in moduli], axis=1) * L
+        #: Modulus times volume.
+        self.scale = float(H[:, :n].sum()) * (ne // len(H))
+        H = H.take(order, 1)
         frame = self._frame(mesh, element, n, G)
         C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
              self.constant[:, 2:, 2:])
@@ -179,39 +180,26 @@ class CableKernel(ElementKernel):
         w, area = self._rule[1], self._across.moments(self.points, what="area")[0]
         return float(area @ w @ self._across.mesh.lengths)
 
-    @property
-    def scale(self) -> float:
-        """Modulus times volume."""
-        out = 0.0
-        for t in self.tables:
-            own = (t.pairs[0] == t.pairs[1]) & (t.pairs[0] < self.points_number)
-            out += float(t.H[:, own].sum()) * (len(t.start) // len(t.H))
-        return out
-
     def strain(self, u: Array) -> Array:
         """Extension and change of curvature at the points, (2, points, ne)."""
         return strains(self.elements[0], self._checked(u)).reshape(2, self.points_number, -1)
 
-    @cached_property
-    def _outer(self):
-        """Of the reference: coordinates and lengths of the bottom and top fibres, and measures."""
-        h, rest = self._across.mesh.mapping().height(self.points)[0], self._measured(0.0)
-        Y = 0.5 * (np.full((1, 1), h) if isinstance(h, float) else h.T)
-        y = np.array([-Y, Y])
-        return y, 1.0 - y * rest[1], rest
-
-    def _measured(self, d):
-        """|r_X| and the curvature, (2, points, 1 or ne), for a change of the rows."""
-        z = (self.tables[0].frame + d).view(complex)[..., 0].T
-        return np.array([np.abs(z[::2]), (z[1::2] / z[::2]).imag])
-
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""
-        y, length, rest = self._outer
+        def measured(z):
+            return np.abs(z[:, ::2]), (z[:, 1::2] / z[:, ::2]).imag
+
+        t, h = self.tables[0], self._across.mesh.mapping().height(self.points)[0]
+        z = t.frame.view(complex)[..., 0]
+        start, bent = measured(z)
+        y = np.array([-0.5, 0.5])[:, None, None] * h
         if u.dtype.kind == "c":
-            eps, kappa = first_order(self.strain(u))
+            eps, kappa = (x.T for x in first_order(self.strain(u)))
         else:
-            U = self.gather(self._checked(u))
+            U = self.gather(self._checked(u)).view(complex)[..., 0]
             U[:, self.nd // 2] -= U[:, 0]
-            eps, kappa = self._measured(self.tables[0].G @ U[:, 1:]) - rest
-        return 1.0 + (eps - y * kappa) / length
+            U = U[:, 1:]
+            length, curvature = measured(z + (
+                U @ t.G[0].T if len(t.G) == 1 else (t.G @ U[..., None])[..., 0]))
+            eps, kappa = length - start, curvature - bent
+        return (1.0 + (eps - y * kappa) / (1.0 - y * bent)).swapaxes(1, 2)

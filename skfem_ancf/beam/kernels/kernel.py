@@ -36,19 +36,20 @@ class ElementKernel:
 
     def __init__(self, mesh: MeshBeam, element: ElementBeam) -> None:
         self.nd, self.t = 2 * element.nodal_dofs, mesh.t
+        self._ends: Any = (slice(-1), slice(1, None)) if mesh.is_chain else mesh.t
         self.N = self.nd * mesh.p.shape[1]
 
     def gather(self, u: Array, elements: Any = slice(None)) -> Array:
         """Element values (ne, nb, 2) of DOFs (N,)."""
-        nodes, t = u.reshape(-1, self.nd), self.t[:, elements]
-        return np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1).reshape(t.shape[1], self.nd, 2)
+        return u.reshape(-1, self.nd).take(self.t[:, elements].T, 0).reshape(-1, self.nd, 2)
 
     def scatter(self, force: Array) -> Array:
         """Sum (N,) of element vectors (ne, nb, 2)."""
         out = np.zeros(self.N, dtype=force.dtype)
         nodes, parts = out.reshape(-1, self.nd), force.reshape(-1, 2, self.nd)
-        nodes[self.t[0]] += parts[:, 0]  # left nodes are unique
-        nodes[self.t[1]] += parts[:, 1]
+        left, right = self._ends
+        nodes[left] += parts[:, 0]  # left nodes are unique
+        nodes[right] += parts[:, 1]
         return out
 
     def _checked(self, u):
