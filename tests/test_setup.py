@@ -49,7 +49,8 @@ def test_scenes_go_when_nobody_asks_for_them(element):
         del scene, state
         assert changed.solve_static().system.backend.tables.system is changed.system
         assert [x() for x in gone] == 3 * [None]
-        assert ref(cantilever(element).solve_static().system.beams[0].mesh)() is None
+        mesh = ref(cantilever(element).solve_static().system.beams[0].mesh)
+        assert mesh() is None
     finally:
         gc.enable()
 

@@ -181,8 +181,9 @@ def _held(c):
     if node is None:
         return False
     q = member.q0_local
-    return any(abs(q[d ^ 1] - (q[node + (d ^ 1) % 2] if d % member.nd < 2 else 0.0)) > HELD * sizes[d]
-               for d in held)
+    levers = ((q[d ^ 1] - (q[node + (d ^ 1) % 2] if d % member.nd < 2 else 0.0), sizes[d])
+              for d in held)
+    return any(abs(lever) > HELD * size for lever, size in levers)
 
 
 def _motions(c, joints):
