@@ -126,7 +126,7 @@ class Forces:
         for k, part in enumerate(self.parts):
             a, b = np.divmod(np.arange(16), 4) if part.kind == TORSION else FIRST
             blocks.append(((part.d, part.e), k + n * np.arange(4), a, b, k + n * (4 * a + b)))
-        self._blocks: list[Any] = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
+        self._blocks = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
         row, at = 4 * n, 16 * n
         self._slices = []
         for element in self.custom:
