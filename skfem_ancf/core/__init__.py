@@ -4,7 +4,7 @@ from .errors import (AncfError, CallError, CallbackError, CheckpointError, Check
                      ConvergenceError, FileError, InputError, Interrupted, MeshError, MissingExtra,
                      ModelWarning, NameUnknown, NearMisses, PickleError, StabilityWarning,
                      SupportError, SweepWarning, ask, ask_array, ask_field, ask_number, explained,
-                     is_masked, require_direction, require_finite, require_finite_scalar,
+                     is_masked, refuse, require_direction, require_finite, require_finite_scalar,
                      require_flag, require_function, require_increasing, require_index,
                      require_integer, require_label, require_like, require_moderate, require_module,
                      require_names, require_not_negative, require_option, require_options,

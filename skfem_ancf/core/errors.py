@@ -190,20 +190,33 @@ def shown(value: object) -> str:
     return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
 
 
-#: Other names of the components of position and displacement, by their numbers.
-AXES = {name: k for k, axis in ((1, "x"), (2, "y")) for name in (
-    axis, f"u{axis}", f"u_{axis}", f"d{axis}", f"r{axis}", f"r{k}", f"u{k}", f"u^{k}", f"u_{k}",
-    f"r^{k}", f"r_{k}")}
+class _Shown:
+    """A value in the format of a message: ``{!r}`` is :func:`shown`."""
+
+    def __init__(self, value):
+        self.value = value
+
+    def __repr__(self):
+        return shown(self.value)
+
+    def __format__(self, spec):
+        return format(self.value, spec)
+
+
+def refuse(wrong: object, message: str, *values: Any, error: type[InputError] = InputError) -> None:
+    """Raise an error if something is wrong, with values in its message: ``{!r}`` shortens one."""
+    if wrong:
+        raise error(message.format(*map(_Shown, values)) if values else message)
 
 
 def _suggested(name, known):
     """The most similar known name as the end of a message, or ""."""
     names = {k.lower(): k for k in known if isinstance(k, str)}
-    if isinstance(name, str) and name.lower() in AXES:
-        for same in (f"r^{AXES[name.lower()]}", f"u^{AXES[name.lower()]}"):
-            if same in names:
-                return f"; did you mean {same!r}?"
-    found = difflib.get_close_matches(name.lower() if isinstance(name, str) else "", names, 1, 0.5)
+    given = name.lower() if isinstance(name, str) else ""
+    axis = re.fullmatch(r"[urd]?[_^]?([xy12])", given)  # of a position or displacement
+    number = {"x": 1, "y": 2}.get(axis[1], axis[1]) if axis else ""
+    found = ([same for same in (f"r^{number}", f"u^{number}") if same in names]
+             or difflib.get_close_matches(given, names, 1, 0.5))
     return f"; did you mean {names[found[0]]!r}?" if found else ""
 
 
@@ -558,50 +571,31 @@ def warn(message: str, category: type[Warning]) -> None:
     warnings.warn(message, category, stacklevel=level)
 
 
-#: Attributes and their names in other packages. The first word must be there.
-MEANT = {
-    "solve_static": "solve run_static static equilibrium analyze analyse analysis newton nonlinear",
-    "run": "quasi_static quasistatic solve_steps steps",
-    "integrate": "simulate simulation transient dynamic dynamics solve_dynamic time_history evolve",
-    "modes": "eigenvalues eigenfrequencies eigenmodes frequencies natural_frequencies modal eig",
-    "buckling": "buckle critical_load critical_loads",
-    "continuation": "arc_length arclength riks path equilibrium_path",
-    "point_force": "force forces add_force point_load nodal_force nodal_load concentrated_force",
-    "line_load": "distributed_load distributed_force uniform_load q",
-    "gravity": "self_weight weight body_force acceleration",
-    "moment": "torque end_moment point_moment",
-    "add": "add_load add_support add_joint add_spring append",
-    "clamp": "fixed fixed_support support encastre built_in fix_end boundary_condition bc",
-    "pin": "pinned support simply_supported",
-    "fix": "support roller constrain constraint dirichlet boundary_condition bc",
-    "hinge": "pin_joint revolute revolute_joint",
-    "weld": "connect rigid_joint fixed_joint glue join",
-    "obstacle": "contact wall ground",
-    "replace(loads=...)": "load_case load_cases with_loads set_loads",
-    "replace(beams=...)": "with_beams",
-    "sensors.to_csv": "to_csv csv write_csv save_csv",
-    "to_xarray": "to_pandas to_dataframe dataset",
-    "animate": "film movie video gif",
-    "t": "time times",
-    "frequencies": "omega omegas eigenfrequencies natural_frequencies",
-    "shapes": "eigenvectors vectors modeshapes",
-    "load": "load_factor load_factors lambdas",
-    "p": "nodes points coordinates vertices",
-    "refined": "subdivide",
-    "plot": "draw show",
-    "draw": "plot show",
-}
-#: The same of a State, which a scene has only when it is solved.
-OF_STATE = {
-    "plot": "plot_deformed plot_displacement plot_stress plot_strain draw_deformed",
-    "displacement": "displacements deflection deflections u disp",
-    "stress": "stresses sigma",
-    "strain": "strains",
-    "field": "von_mises",
-    "reactions": "reaction support_forces support_reactions forces",
-    "resultants": "section_forces internal_forces bending_moment normal_force shear_force N Q M",
-    "save": "export write to_vtk to_vtu",
-}
+#: Attributes, each with its names in other packages. What only a state has, a scene has solved.
+SYNONYMS = [entry.lower().split() for entry in """
+solve_static solve run_static static equilibrium analyze analyse analysis newton nonlinear;
+run quasi_static quasistatic solve_steps steps; buckling buckle critical_load critical_loads;
+integrate simulate simulation transient dynamic dynamics solve_dynamic time_history evolve;
+modes eigenvalues eigenfrequencies eigenmodes frequencies natural_frequencies modal eig;
+continuation arc_length arclength riks path equilibrium_path; refined subdivide; plot draw show;
+point_force force forces add_force point_load nodal_force nodal_load concentrated_force;
+line_load distributed_load distributed_force uniform_load q; moment torque end_moment point_moment;
+gravity self_weight weight body_force acceleration; add add_load add_support add_joint add_spring;
+clamp fixed fixed_support support encastre built_in fix_end boundary_condition bc;
+pin pinned support simply_supported; fix support roller constrain constraint dirichlet bc;
+hinge pin_joint revolute revolute_joint; weld connect rigid_joint fixed_joint glue join;
+obstacle contact wall ground; replace(loads=...) load_case load_cases with_loads set_loads;
+replace(beams=...) with_beams; sensors.to_csv to_csv csv write_csv save_csv; t time times;
+to_xarray to_pandas to_dataframe dataset; animate film movie video gif; draw plot show;
+frequencies omega omegas eigenfrequencies natural_frequencies; shapes eigenvectors modeshapes;
+load load_factor load_factors lambdas; p nodes points coordinates vertices;
+solve_static().plot plot_deformed plot_displacement plot_stress plot_strain draw_deformed;
+solve_static().displacement displacement displacements deflection deflections u disp;
+solve_static().stress stress stresses sigma; solve_static().strain strain strains;
+solve_static().field field von_mises; solve_static().save save export write to_vtk to_vtu;
+solve_static().reactions reactions reaction support_forces support_reactions forces;
+solve_static().resultants resultants section_forces internal_forces bending_moment normal_force
+shear_force N Q M""".split(";")]
 
 
 class NearMisses:
@@ -611,19 +605,14 @@ class NearMisses:
         def __getattr__(self, name):
             if hasattr(type(self), name):  # a property failed: raise its error
                 return object.__getattribute__(self, name)
-            text = ""
-            if not name.startswith("_"):
-                there = [one for one in dir(self) if not one.startswith("_")]
-                solved = {f"solve_static().{key}": f"{key} {words}" for key, words in
-                          OF_STATE.items()}
-                others = [key for table in (MEANT, solved, OF_STATE)
-                          for key, words in table.items() if name.lower() in words.lower().split()
-                          and re.split(r"\W", key)[0] in there]
-                others = others or difflib.get_close_matches(name, there, 3, 0.6)
-                text = f"; did you mean {' or '.join(others[:3])}?" if others else ""
+            there = [] if name.startswith("_") else [x for x in dir(self) if not x.startswith("_")]
+            meant = [key for key, *words in SYNONYMS if name.lower() in words]
+            known = [x for key in meant for x in (key, key.removeprefix("solve_static()."))
+                     if re.split(r"\W", x)[0] in there]
+            found = [*dict.fromkeys(known)] or difflib.get_close_matches(name, there, 3, 0.6)
             # without name=, else Python adds its own suggestion
-            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}{text}",
-                                 name=None, obj=None)
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}" + (
+                f"; did you mean {' or '.join(found[:3])}?" if found else ""), name=None, obj=None)
 
 
 #: Up to this number of times a function is called one by one.
