@@ -572,7 +572,7 @@ def warn(message: str, category: type[Warning]) -> None:
 
 
 #: Attributes, each with its names in other packages. What only a state has, a scene has solved.
-SYNONYMS = [entry.lower().split() for entry in """
+SYNONYMS = """
 solve_static solve run_static static equilibrium analyze analyse analysis newton nonlinear;
 run quasi_static quasistatic solve_steps steps; buckling buckle critical_load critical_loads;
 integrate simulate simulation transient dynamic dynamics solve_dynamic time_history evolve;
@@ -595,7 +595,7 @@ solve_static().stress stress stresses sigma; solve_static().strain strain strain
 solve_static().field field von_mises; solve_static().save save export write to_vtk to_vtu;
 solve_static().reactions reactions reaction support_forces support_reactions forces;
 solve_static().resultants resultants section_forces internal_forces bending_moment normal_force
-shear_force N Q M""".split(";")]
+shear_force n q m"""
 
 
 class NearMisses:
@@ -606,7 +606,8 @@ class NearMisses:
             if hasattr(type(self), name):  # a property failed: raise its error
                 return object.__getattribute__(self, name)
             there = [] if name.startswith("_") else [x for x in dir(self) if not x.startswith("_")]
-            meant = [key for key, *words in SYNONYMS if name.lower() in words]
+            table = map(str.split, SYNONYMS.split(";"))
+            meant = [key for key, *words in table if name.lower() in words]
             known = [x for key in meant for x in (key, key.removeprefix("solve_static()."))
                      if re.split(r"\W", x)[0] in there]
             found = [*dict.fromkeys(known)] or difflib.get_close_matches(name, there, 3, 0.6)
