@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .core import (Array, ArrayLike, CallError, CallbackError, InputError, Interrupted, NameUnknown,
-                   PickleError, SweepWarning, require_function, require_integer, require_like,
-                   require_module, shown, warn)
+                   PickleError, SweepWarning, refuse, require_function, require_integer,
+                   require_like, require_module, shown, warn)
 from .core.progress import progress_bar
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -187,16 +187,14 @@ def _members(parameters):
                 raise InputError(f"the parameter {name!r} must have one value for each member, got "
                                  f"{shown(x)}; what is the same for all belongs into build")
         lengths = {name: len(x) for name, x in columns.items()}
-        if len(set(lengths.values())) > 1:
-            raise InputError(f"the parameters must have equal lengths, got {lengths}; for all "
-                             "combinations hand a list of dicts, made by itertools.product")
+        refuse(len(set(lengths.values())) > 1, "the parameters must have equal lengths, got {}; "
+               "for all combinations hand a list of dicts, made by itertools.product", lengths)
         parameters = [dict(zip(columns, row)) for row in zip(*columns.values())]
     elif isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
         raise InputError("parameters must be a dict of arrays or a list of dicts, got "
                          f"{shown(parameters)}")
     members = list(parameters)
-    if not members:
-        raise InputError("there are no members in the parameters")
+    refuse(not members, "there are no members in the parameters")
     for k, member in enumerate(members):
         if not isinstance(member, Mapping) or set(member) != set(members[0]):
             raise InputError("parameters must be a dict of arrays, or a list of dicts with "
@@ -214,9 +212,8 @@ def _measured(build, measure, member):
             if not isinstance(name, str) or np.asarray(x).dtype.kind not in "biufc":
                 raise CallbackError("measure must return a number, an array of numbers, or a dict "
                                     f"of them by name, got {shown(value)}")
-            if name in member:
-                raise CallbackError(f"measure calls a value {name!r}, which is a parameter of "
-                                    "build: give it another name")
+            refuse(name in member, "measure calls a value {!r}, which is a parameter of build: "
+                   "give it another name", name, error=CallbackError)
         return {name: np.array(x) * 1.0 for name, x in found.items()}
     except Exception as error:
         return f"{type(error).__name__}: {error}"

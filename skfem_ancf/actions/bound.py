@@ -12,8 +12,8 @@ from scipy import sparse
 from ..beam.beam import Beam
 from ..beam.distribution import Facets
 from ..beam.layout import Layout
-from ..core import (Array, ArrayLike, InputError, cached_property, is_builtin, require_finite,
-                    require_slope, shown, warnings_as_errors)
+from ..core import (Array, ArrayLike, InputError, cached_property, is_builtin, refuse,
+                    require_finite, require_slope, shown, warnings_as_errors)
 from .places import Vector
 
 #: Relative step of differences, where a force does not accept complex numbers.
@@ -596,9 +596,8 @@ class UserForce(BoundForce):
 
     def _at(self, force):
         found = np.asarray(force)
-        if found.shape != (self._N,):
-            raise InputError(f"the force of {self.item!r} must have the shape ({self._N},), got "
-                             f"{found.shape}")
+        refuse(found.shape != (self._N,), "the force of {!r} must have the shape ({},), got {}",
+               self.item, self._N, found.shape)
         return found[self._dofs].reshape(-1, 2)
 
     def potential(self, x: Array, *past: Any) -> float | None:

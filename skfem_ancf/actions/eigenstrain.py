@@ -23,7 +23,7 @@ from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.remembered import has_history, remembers
 from ..beam.strains import on_grid, strain_at, stretched
-from ..core import (Array, InputError, TimeFunction, ask_array, require_finite_scalar,
+from ..core import (Array, InputError, TimeFunction, ask_array, refuse, require_finite_scalar,
                     require_function, shown, stress_of)
 from ..formulations import COMPONENTS
 from ..sections import Layer
@@ -356,11 +356,10 @@ def require_alone(loads: Sequence[Any]) -> None:
     """Raise InputError where several eigenstrains act on one beam with a nonlinear law."""
     strains = [load for load in loads if isinstance(load, EigenStrain)]
     for load in strains:
-        if load.grows and sum(other.beam is load.beam for other in strains) > 1:
-            raise InputError(
-                f"the material of {load.beam!r} is nonlinear, so eigenstrains cannot be "
-                "superposed: give their sum as one eigenstrain, a function of (x, y), or such a "
-                "function times a function of t")
+        refuse(load.grows and sum(other.beam is load.beam for other in strains) > 1,
+               "the material of {!r} is nonlinear, so eigenstrains cannot be superposed: give "
+               "their sum as one eigenstrain, a function of (x, y), or such a function times a "
+               "function of t", load.beam)
 
 
 def _of_fibres(beam, eigen):
@@ -416,11 +415,9 @@ def products(name: str, function: Callable[..., Any], beam: Beam
         k, p = np.unravel_index(np.argmax(np.abs(left)), left.shape)
         chosen.append(k)
         places.append(p)
-        if len(chosen) > MOST:
-            raise InputError(
-                f"{name}(x, y, t) is no sum of at most {MOST} functions of (x, y) times functions "
-                "of t, as x * np.sin(t) is: give such a sum, or several eigenstrains with an "
-                "amplitude each")
+        refuse(len(chosen) > MOST, "{}(x, y, t) is no sum of at most {} functions of (x, y) times "
+               "functions of t, as x * np.sin(t) is: give such a sum, or several eigenstrains with "
+               "an amplitude each", name, MOST)
         left = F - np.linalg.solve(F[np.ix_(chosen, places)].T, F[:, places].T).T @ F[chosen]
     inverse = np.linalg.inv(F[np.ix_(chosen, places)])
     return [(at[k], Coefficient(name, function, x[places], y[places], inverse[:, j]))

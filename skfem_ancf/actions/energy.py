@@ -15,8 +15,8 @@ from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
 from ..core import (Array, ArrayLike, InputError, NameUnknown, Place, TimeFunction, ask, gauss,
-                    product_rule, require_finite, require_flag, require_function, require_module,
-                    require_slope, shown)
+                    product_rule, refuse, require_finite, require_flag, require_function,
+                    require_module, require_slope)
 from .bound import at_generic_displacements
 from .item import Item
 from .loads import Load
@@ -323,9 +323,8 @@ class Energy(Density):
                     raise InputError(f"autodiff=True finds the {name}: leave it out" if autodiff
                                      else f"psi is compiled by Numba: the {name} has to be, too")
         self.scaled, self.check = require_flag("scaled", scaled), require_flag("check", check)
-        if amplitude is not None and not scaled:
-            raise InputError("an amplitude is for loads, and scaled=False excludes it: let psi "
-                             "depend on its time t")
+        refuse(amplitude is not None and not scaled, "an amplitude is for loads, and scaled=False "
+               "excludes it: let psi depend on its time t")
         self.psi, self.gradient, self.hessian, self.over = psi, gradient, hessian, over
         self.autodiff = require_flag("autodiff", autodiff)
 
@@ -372,10 +371,9 @@ class Energy(Density):
             steps = IMAGINARY * 1j * np.eye(6)[:, :, None, None]
             return self._density(y[:, None] + steps, part).imag / IMAGINARY
         found = self._ask("gradient", y, part)
-        if not isinstance(found, (tuple, list)) or len(found) != 2:
-            raise InputError("gradient(r, F, X, t) of an Energy must return two arrays, of "
-                             "d psi / d r, (2, ...), and of d psi / d F, (2, 2, ...), got "
-                             f"{shown(found)}")
+        refuse(not isinstance(found, (tuple, list)) or len(found) != 2, "gradient(r, F, X, t) of "
+               "an Energy must return two arrays, of d psi / d r, (2, ...), and of d psi / d F, "
+               "(2, 2, ...), got {!r}", found)
         shape = y.shape[1:]
         return np.concatenate([
             _shaped("gradient", found[0], (2, *shape)),
@@ -478,11 +476,10 @@ class Energy(Density):
                 "ij,jk...->ik...", Q, y[2:].reshape(2, 2, *y.shape[1:])).reshape(y[2:].shape)])
             psi, *others = (self._density(x, part) for x in (y, moved, turned))
             for what, other in zip(("moved", "turned"), others):
-                if np.max(np.abs(other - psi)) > _INVARIANT * np.max(np.abs(psi)):
-                    raise InputError(
-                        f"psi of {self!r} changes where the body is {what} as a whole: it is not "
-                        "a strain energy, which depends on F^T F. Leave out check=True for "
-                        "external actions, as a foundation or a field")
+                refuse(np.max(np.abs(other - psi)) > _INVARIANT * np.max(np.abs(psi)),
+                       "psi of {!r} changes where the body is {} as a whole: it is not a strain "
+                       "energy, which depends on F^T F. Leave out check=True for external actions, "
+                       "as a foundation or a field", self, what)
 
 
 def check_derivatives(energy: Energy, beam: Beam, u: ArrayLike | None = None) -> None:
@@ -511,8 +508,7 @@ def check_derivatives(energy: Energy, beam: Beam, u: ArrayLike | None = None) ->
     ...
     skfem_ancf.core.errors.InputError: gradient of ... is not the derivative of psi: ...
     """
-    if not isinstance(energy, Energy):
-        raise InputError(f"check_derivatives takes an Energy, got {shown(energy)}")
+    refuse(not isinstance(energy, Energy), "check_derivatives takes an Energy, got {!r}", energy)
     bound = energy.bind(beam)
     if u is not None:
         bound._require_derivatives(require_finite("u", u, (beam.N,)),
@@ -526,9 +522,8 @@ def _shaped(name, found, shape):
         raise InputError(f"{name}(r, F, X, t) of an Energy must return the shape {shape}, got "
                          f"{np.shape(found)}; sums over components are (r**2).sum(axis=0)"
                          ) from None
-    if values.dtype.kind not in "biufc":
-        raise InputError(f"{name}(r, F, X, t) of an Energy must return numbers, got "
-                         f"{shown(found)}")
+    refuse(values.dtype.kind not in "biufc", "{}(r, F, X, t) of an Energy must return numbers, got "
+           "{!r}", name, found)
     return values
 
 

@@ -14,7 +14,7 @@ from skfem.element import DiscreteField
 from ..beam.distribution import AXIS, BODY, Distribution, Sampled, facets_along
 from ..beam.domain import Domain
 from ..beam.layout import WhichMember
-from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss,
+from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss, refuse,
                     require_finite, require_flag, require_slope, shown, warnings_as_errors)
 from .energy import Density, points_of
 from .bound import at_generic_displacements
@@ -97,12 +97,10 @@ class FormLoad(Density):
         if not isinstance(form, LinearForm):
             raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
                              "form is a subclass of skfem_ancf.actions.loads.Load, for scene.add")
-        if isinstance(boundary, BilinearForm):
-            raise InputError("the second argument of a load is the boundary, got "
-                             f"{shown(boundary)}: give the derivative as tangent=")
-        if tangent is not None and not isinstance(tangent, BilinearForm):
-            raise InputError("tangent must be a scikit-fem BilinearForm, of u, v and w, got "
-                             f"{shown(tangent)}")
+        refuse(isinstance(boundary, BilinearForm), "the second argument of a load is the boundary, "
+               "got {!r}: give the derivative as tangent=", boundary)
+        refuse(tangent is not None and not isinstance(tangent, BilinearForm), "tangent must be a "
+               "scikit-fem BilinearForm, of u, v and w, got {!r}", tangent)
         self.form, self.boundary, self.tangent = form, boundary, tangent
         self.scaled = require_flag("scaled", scaled)
 
@@ -123,9 +121,8 @@ class FormLoad(Density):
         if not used:
             dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._distribution(P))
             return dead._with(scaled=self.scaled)
-        if not beam.has_sections:
-            raise InputError(f"a form with w.r acts on elements with sections, as "
-                             f"ElementBeamANCF(2), and not on {beam!r}")
+        refuse(not beam.has_sections, "a form with w.r acts on elements with sections, as "
+               "ElementBeamANCF(2), and not on {!r}", beam)
         if self.tangent is None:
             logger.info("%r has no tangent=: its derivative is found by differences", self)
         else:

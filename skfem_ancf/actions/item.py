@@ -8,7 +8,7 @@ from os import urandom
 from typing import TYPE_CHECKING, Any
 
 from ..beam.layout import Layout
-from ..core import Immutable, InputError, explained, shown
+from ..core import Immutable, InputError, explained, refuse, shown
 from .bound import Bound, user_parts
 
 if TYPE_CHECKING:
@@ -115,9 +115,8 @@ class Item(Immutable, Bound):
                 raise InputError(f"bind(layout) of {self!r} must return an Item, got "
                                  f"{shown(bound)}")
             out = user_parts(bound, layout)
-        if not out:
-            raise InputError(f"{self!r} does nothing: an item defines energy(u, t), force(u, v, "
-                             "t), constraint(u, t) or mass()")
+        refuse(not out, "{!r} does nothing: an item defines energy(u, t), force(u, v, t), "
+               "constraint(u, t) or mass()", self)
         return out
 
     def symbols(self, layout: Layout) -> Iterable[Any]:

@@ -19,7 +19,7 @@ from ..beam.kinematics import direction, element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
 from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,
-                    ask_field, ask_number, gauss, is_builtin, read_only, require_finite,
+                    ask_field, ask_number, gauss, is_builtin, read_only, refuse, require_finite,
                     require_finite_scalar, require_function, require_slope, sample, shown, warn)
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
@@ -461,9 +461,8 @@ class DeadLoad(Load):
         return self._distribution
 
     def bind(self, beam: Beam) -> Load:
-        if beam is not self._of:
-            raise InputError("a DeadLoad is a vector of the degrees of freedom of one mesh and "
-                             "does not fit another: use scene.load(form) or a Load with bind(beam)")
+        refuse(beam is not self._of, "a DeadLoad is a vector of the degrees of freedom of one mesh "
+               "and does not fit another: use scene.load(form) or a Load with bind(beam)")
         return self._with(beam=beam)
 
     def force(self, u: Array) -> Array:
@@ -504,12 +503,10 @@ class Pressure(Load):
 
     def bind(self, beam: Beam) -> Load:
         facets = np.asarray(facets_of(beam.mesh, self.boundary))
-        if not beam.has_sections and np.any(facets < beam.mesh.p.shape[1]):
-            raise InputError(
-                f"a pressure at {self.boundary!r} of a cable has no effect: a cable has no degrees "
-                "of freedom across the section. Use an element with sections, as "
-                "ElementBeamANCF(2), or for a force of constant direction scene.traction or "
-                "scene.point_force")
+        refuse(not beam.has_sections and np.any(facets < beam.mesh.p.shape[1]),
+               "a pressure at {!r} of a cable has no effect: a cable has no degrees of freedom "
+               "across the section. Use an element with sections, as ElementBeamANCF(2), or for a "
+               "force of constant direction scene.traction or scene.point_force", self.boundary)
         # sparse matrix from the position to the force of a pressure
         row, column, value = [], [], []
         for one in surfaces_of(beam, facets, beam.element.facet_points):

@@ -12,7 +12,7 @@ from ..beam.domain import Domain
 from ..beam.kinematics import locate, probe_reference
 from ..beam.kinematics import direction as direction_of, direction_weights
 from ..beam.layout import Layout, WhichMember
-from ..core import Array, ArrayLike, InputError, MeshError, require_finite, shown
+from ..core import Array, ArrayLike, InputError, MeshError, refuse, require_finite, shown
 from ..mesh.places import as_point, is_place, is_point, node_of, points_of_rows
 
 #: Name of the ground, in place of a beam.
@@ -226,18 +226,16 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
         names = [layout.members[k].name or k for k in found]
         raise InputError(f"the point {shown(place)} is in several beams, {names}: choose one, "
                          f"as ({names[0]!r}, {shown(place)})")
-    if not found and where_none_is is None:
-        raise InputError(f"no beam and no rigid body is at the point {shown(place)}: for one of "
-                         f"the ground write ('ground', {shown(place)}), for one outside of the "
-                         "outline of a rigid body (body, (x, y))")
+    refuse(not found and where_none_is is None, "no beam and no rigid body is at the point {!r}: "
+           "for one of the ground write ('ground', {!r}), for one outside of the outline of a "
+           "rigid body (body, (x, y))", place, place)
     return (found[0] if found else where_none_is), (
         place if isinstance(place, str) else tuple(map(float, place)))
 
 
 def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
     """A value for each of n beams: given once for all, or once for each."""
-    if value is None:
-        raise InputError(f"a joint needs {what}")
+    refuse(value is None, "a joint needs {}", what)
     value = points_of_rows(value)
     if is_place(value):
         return (value,) * n
@@ -251,19 +249,16 @@ def both_of(name: str, place: Any) -> tuple[Any, Any]:
     """A beam or body and a place on it; a RigidBody alone has the place None."""
     if isinstance(place, RigidBody):
         return place, None
-    if not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place):
-        raise InputError(f"{name} is a beam with a place of it, as (1, 'left'), or a RigidBody, "
-                         f"got {shown(place)}")
+    refuse(not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place),
+           "{} is a beam with a place of it, as (1, 'left'), or a RigidBody, got {!r}", name, place)
     return place[0], place[1]
 
 
 def several(beams: Any) -> tuple[Any, ...]:
     """Check the beams and bodies of a joint, two at least."""
-    if not isinstance(beams, (tuple, list)) or len(beams) < 2:
-        raise InputError("beams must be two beams or rigid bodies or more, by Beam, RigidBody, "
-                         f"name or number, or 'ground', got {shown(beams)}")
-    if all(map(is_ground, beams)):
-        raise InputError(f"a joint needs a beam or a rigid body, got {shown(beams)}")
+    refuse(not isinstance(beams, (tuple, list)) or len(beams) < 2, "beams must be two beams or "
+           "rigid bodies or more, by Beam, RigidBody, name or number, or 'ground', got {!r}", beams)
+    refuse(all(map(is_ground, beams)), "a joint needs a beam or a rigid body, got {!r}", beams)
     return tuple(beams)
 
 

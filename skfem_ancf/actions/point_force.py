@@ -15,8 +15,8 @@ from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.masses import TURN
 from ..beam.points import Points
 from ..beam.rigid import RigidBody, on_body
-from ..core import (Array, ArrayLike, InputError, TimeFunction, ask, require_direction,
-                    require_finite, require_finite_scalar, require_positive)
+from ..core import (Array, ArrayLike, TimeFunction, ask, refuse, require_direction, require_finite,
+                    require_finite_scalar, require_positive)
 from ..mesh.places import as_point
 from .item import Item
 from .places import dense_entries, point, section
@@ -256,9 +256,8 @@ class Train(TimedLoad):
         super().__init__(beam, amplitude)
         self.forces = require_finite("forces", np.atleast_1d(forces), (None,))
         self.distances = require_finite("distances", np.atleast_1d(distances), (None,))
-        if len(self.forces) != len(self.distances):
-            raise InputError(f"each of the {len(self.forces)} forces has a distance from the "
-                             f"first, got {len(self.distances)} distances")
+        refuse(len(self.forces) != len(self.distances), "each of the {} forces has a distance from "
+               "the first, got {} distances", len(self.forces), len(self.distances))
         self.speed = require_positive("speed", speed)
         self.start = require_finite_scalar("start", start)
         self.direction = require_direction("direction", direction)

@@ -12,7 +12,7 @@ from skfem.assembly import Basis, FacetBasis
 from skfem.element import ElementVector
 
 from ..core import (Array, ArrayLike, Immutable, InputError, NameUnknown, Place, cached_property,
-                    read_only, require_finite, require_flag, require_integer, require_label,
+                    read_only, refuse, require_finite, require_flag, require_integer, require_label,
                     require_like, require_names, require_unmasked, shown)
 from ..elements import ElementBeam, choose_element
 from ..formulations import Formulation, Term, get_formulation
@@ -44,9 +44,8 @@ def reference_coordinates(basis: Basis) -> Array:
     """
     require_like("basis", basis, "Basis of ElementVector(element) on a MeshBeam", "mesh", "elem")
     element = getattr(basis.elem, "elem", None)
-    if not isinstance(basis.mesh, MeshBeam) or not isinstance(element, ElementBeam):
-        raise InputError("the basis must be one of ElementVector(element) on a MeshBeam, got "
-                         f"{shown(basis)}")
+    refuse(not isinstance(basis.mesh, MeshBeam) or not isinstance(element, ElementBeam),
+           "the basis must be one of ElementVector(element) on a MeshBeam, got {!r}", basis)
     return _coordinates(basis.mesh, element, basis.mesh.p)
 
 
@@ -325,9 +324,8 @@ class Beam(Immutable):
 
     def _checked(self, u, X, tind):
         u, X = require_finite("u", u, (self.N,)), require_finite("X", X)
-        if X.ndim not in (2, 3) or X.shape[0] != 2:
-            raise InputError("X must have shape (2, npoints) or (2, nelements, npoints), got "
-                             f"{X.shape}")
+        refuse(X.ndim not in (2, 3) or X.shape[0] != 2, "X must have shape (2, npoints) or (2, "
+               "nelements, npoints), got {}", X.shape)
         if tind is not None:
             require_unmasked("tind", tind)
             tind = self.mesh.normalize_elements(tind)

@@ -13,8 +13,8 @@ from skfem import Basis, BilinearForm, ElementVector, LinearForm
 from skfem.assembly.dofs import DofsView
 
 from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, NameUnknown,
-                    explained, gauss, read_only, require_finite, require_label, require_slope,
-                    shown)
+                    explained, gauss, read_only, refuse, require_finite, require_label,
+                    require_slope, shown)
 from ..materials import Material
 from ..mesh.places import as_point, is_point
 from .solid import SolidForms, grade_at
@@ -180,9 +180,8 @@ class Domain(Immutable):
     def of_basis(self, u: Array) -> Array:
         """DOFs of the scene (..., N), as of ``state.u_of(domain)``, in the order of the basis."""
         u = require_finite("u", u)
-        if u.shape[-1:] != (self.N,):
-            raise InputError(f"u must hold the {self.N} DOFs of {self!r}, as state.u_of(domain), "
-                             f"got the shape {u.shape}")
+        refuse(u.shape[-1:] != (self.N,), "u must hold the {} DOFs of {!r}, as state.u_of(domain), "
+               "got the shape {}", self.N, self, u.shape)
         return u[..., self._rank]
 
     def numbers(self, dofs: Array) -> Array:
@@ -379,10 +378,9 @@ class Domain(Immutable):
         mesh = self.basis.mesh
         if isinstance(boundary, str) and boundary not in (mesh.boundaries or {}):
             raise NameUnknown("boundary", boundary, list(mesh.boundaries or {}))
-        if is_point(boundary):
-            raise InputError(f"a boundary of {self!r} is needed here, got the point "
-                             f"{shown(boundary)}; scene.pin supports a point, and "
-                             "scene.hinge connects it to another one")
+        refuse(is_point(boundary), "a boundary of {!r} is needed here, got the point {!r}; "
+               "scene.pin supports a point, and scene.hinge connects it to another one", self,
+               boundary)
         found = mesh.normalize_facets(boundary)
         if not len(found):
             raise MeshError(f"no facet of the boundary of {self!r} is at {shown(boundary)}")
@@ -430,9 +428,8 @@ class Domain(Immutable):
         length, centre = np.sum(dx), np.sum(x * dx, axis=(1, 2)) / np.sum(dx)
         off = x - centre[:, None, None]
         values, axes = np.linalg.eigh(np.einsum("iep,jep,ep->ij", off, off, dx) / length)
-        if values[0] > 1e-9 * values[1]:
-            raise InputError(f"the boundary {shown(boundary)} of {self!r} is not straight: a "
-                             "cable cannot be welded to it")
+        refuse(values[0] > 1e-9 * values[1], "the boundary {!r} of {!r} is not straight: a cable "
+               "cannot be welded to it", boundary, self)
         along = axes[:, 1]
         s = np.einsum("i,iep->ep", along, off)
         weights = [LinearForm(lambda v, w: w["f"] * v[0]).assemble(basis, f=f)[self._order][::2]
@@ -544,17 +541,15 @@ def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array
 
 def _require_plane(basis):
     """Raise InputError unless a basis has plane vectors on all cells."""
-    if not isinstance(basis, Basis):
-        raise InputError(f"a Domain needs a Basis of scikit-fem, got {shown(basis)}")
+    refuse(not isinstance(basis, Basis), "a Domain needs a Basis of scikit-fem, got {!r}", basis)
     if basis.mesh.dim() != 2:
         raise InputError(f"a Domain is plane, as beams are, got a mesh of dimension "
                          f"{basis.mesh.dim()}: {shown(basis.mesh)}")
     if not isinstance(basis.elem, ElementVector) or basis.elem.dim != 2:
         raise InputError("the unknown of a Domain is a displacement with two components: use an "
                          f"ElementVector(ElementQuad2()), got {shown(basis.elem)}")
-    if len(np.unique(basis.element_dofs)) < basis.N:
-        raise InputError("the basis of a Domain must cover its whole mesh: for a part of it use "
-                         "mesh.restrict(elements)")
+    refuse(len(np.unique(basis.element_dofs)) < basis.N, "the basis of a Domain must cover its "
+           "whole mesh: for a part of it use mesh.restrict(elements)")
 
 
 def _local(mapping, point, cells):

@@ -10,7 +10,7 @@ import numpy as np
 
 from .beam import Beam
 from .domain import Domain
-from ..core import Array, InputError, NameUnknown, shown
+from ..core import Array, InputError, NameUnknown, refuse, shown
 from .rigid import RigidBody
 
 #: Argument of :func:`select_beam`: a Beam, its name or number; None for the only one.
@@ -90,11 +90,9 @@ def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
     if found:
         return found[0]
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
-    if not beams:
-        raise InputError("a beam is needed here, and the scene has none: give one of its members, "
-                         f"its name or its number; got {shown(beam)}")
-    if beam is None:
-        raise InputError(f"the scene has {len(beams)} beams: choose one with beam=, of {known}")
+    refuse(not beams, "a beam is needed here, and the scene has none: give one of its members, its "
+           "name or its number; got {!r}", beam)
+    refuse(beam is None, "the scene has {} beams: choose one with beam=, of {}", len(beams), known)
     if isinstance(beam, (RigidBody, Domain)):
         raise InputError(f"a beam is needed here, got {shown(beam)}; beams are {known}")
     raise NameUnknown("beam", beam, known)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, ArrayLike, Immutable, InputError, angle_of, read_only, rebuilt,
+from ..core import (Array, ArrayLike, Immutable, InputError, angle_of, read_only, rebuilt, refuse,
                     require_finite, require_finite_scalar, require_label, require_names,
                     require_positive, shown)
 from ..mesh.places import as_point
@@ -175,8 +175,7 @@ class RigidBody(Immutable):
     def local(self, x: ArrayLike) -> Array:
         """Coordinates in the body frame of initial points (2, ...)."""
         x = require_finite("x", x)
-        if x.ndim < 1 or len(x) != 2:
-            raise InputError(f"x must have shape (2, ...), got {x.shape}")
+        refuse(x.ndim < 1 or len(x) != 2, "x must have shape (2, ...), got {}", x.shape)
         return np.tensordot(self._frame.T, x - self.position.reshape((2,) + (1,) * (x.ndim - 1)), 1)
 
     def probe(self, at: Any) -> tuple[Array, Array]:

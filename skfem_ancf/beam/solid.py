@@ -9,7 +9,7 @@ from skfem.assembly import BilinearForm, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.helpers import dot
 
-from ..core import Array, InputError, require_like, require_positive
+from ..core import Array, refuse, require_like, require_positive
 from ..materials import HistoryMaterial, Material
 from ..sections.section import evaluated
 
@@ -87,10 +87,9 @@ class SolidForms:
 
     def __init__(self, material: Material, width: float) -> None:
         require_like("material", material, "Material", "law", "reference")
-        if isinstance(material, HistoryMaterial):
-            raise InputError(f"a Domain has no history of its material, got {material!r}: only "
-                             "beams can be plastic or viscoelastic. Use StVenantKirchhoff or "
-                             "NeoHookean")
+        refuse(isinstance(material, HistoryMaterial), "a Domain has no history of its material, "
+               "got {!r}: only beams can be plastic or viscoelastic. Use StVenantKirchhoff or "
+               "NeoHookean", material)
         one, self.grade = material.reference()
         self.law, self.width, self.material = one.law(), require_positive("width", width), material
         self.energy = Functional(self._energy)

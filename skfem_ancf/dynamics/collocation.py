@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import Array, InputError, gauss, read_only, require_integer
+from ..core import Array, InputError, gauss, read_only, refuse, require_integer
 from ..equations.system import System
 from .base import Motion, Scheme, derivative, difference_row, grown
 from .stage_tangent import Method
@@ -96,10 +96,9 @@ class Collocation(Scheme):
             raise InputError(f"{self!r} does not take {system.forces.changing[0][0]!r}, whose "
                              "stiffness has entries that change from step to step: use "
                              "'energy-momentum' or 'generalized-alpha'")
-        if system.constraints.m and not (self.joined or system.backend.tables.linear_joints):
-            raise InputError(f"{self!r} loses its order with joints that turn or move, and with "
-                             "rigid bodies: use 'radau', or 'energy-momentum', which conserves "
-                             "energy with them")
+        refuse(system.constraints.m and not (self.joined or system.backend.tables.linear_joints),
+               "{!r} loses its order with joints that turn or move, and with rigid bodies: use "
+               "'radau', or 'energy-momentum', which conserves energy with them", self)
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
         """Estimate the error that a step adds to the displacement, shape (N,).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core import Array, InputError
+from ..core import Array, refuse
 from ..equations.system import System
 from .base import Motion, Scheme, derivative, grown
 
@@ -48,10 +48,9 @@ class EnergyMomentum(Scheme):
 
     def require(self, system: System) -> None:
         for domain in system.domains:
-            if not domain.symmetric:
-                raise InputError(f"the tangent of {domain!r} is not symmetric: there is no energy "
-                                 "that the scheme could conserve. Use 'generalized-alpha' or "
-                                 "'radau', or forms that are derivatives of an energy")
+            refuse(not domain.symmetric, "the tangent of {!r} is not symmetric: there is no energy "
+                   "that the scheme could conserve. Use 'generalized-alpha' or 'radau', or forms "
+                   "that are derivatives of an energy", domain)
 
 
 class EnergyMomentum4(EnergyMomentum):
@@ -84,15 +83,12 @@ class EnergyMomentum4(EnergyMomentum):
 
     def require(self, system: System) -> None:
         super().require(system)
-        if system.histories.evolve:
-            raise InputError(
-                f"{self!r} takes a part of each step back in time, which materials and items with "
-                "a history do not know: use 'energy-momentum', 'generalized-alpha', 'gauss' or "
-                "'radau'")
-        if system.damped or system.histories.dissipates:
-            raise InputError(f"{self!r} takes a part of each step back in time, where damping and "
-                             "friction would add energy: use 'energy-momentum', or 'radau' for "
-                             "high order")
+        refuse(system.histories.evolve, "{!r} takes a part of each step back in time, which "
+               "materials and items with a history do not know: use 'energy-momentum', "
+               "'generalized-alpha', 'gauss' or 'radau'", self)
+        refuse(system.damped or system.histories.dissipates, "{!r} takes a part of each step back "
+               "in time, where damping and friction would add energy: use 'energy-momentum', or "
+               "'radau' for high order", self)
 
     def step(self, integrator: Any, y: Motion, dt: float) -> Motion:
         begin, lost = y.t, y.dissipated

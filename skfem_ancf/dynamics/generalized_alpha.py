@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..core import Array, InputError, require_finite_scalar
+from ..core import Array, refuse, require_finite_scalar
 from .base import Motion, Scheme
 
 
@@ -31,8 +31,7 @@ class GeneralizedAlpha(Scheme):
 
     def __init__(self, rho_inf: float = 0.9) -> None:
         rho = require_finite_scalar("rho_inf", rho_inf)
-        if not 0.0 <= rho <= 1.0:
-            raise InputError(f"rho_inf must lie in [0, 1], got {rho!r}")
+        refuse(not 0.0 <= rho <= 1.0, "rho_inf must lie in [0, 1], got {!r}", rho)
         self.set_parameters((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
 
     def set_parameters(self, alpha_m: float, alpha_f: float) -> None:
@@ -83,8 +82,7 @@ class HHT(GeneralizedAlpha):
 
     def __init__(self, alpha: float = 0.05) -> None:
         alpha = require_finite_scalar("alpha", alpha)
-        if not 0.0 <= alpha <= 1.0 / 3.0:
-            raise InputError(f"alpha must lie in [0, 1/3], got {alpha!r}")
+        refuse(not 0.0 <= alpha <= 1.0 / 3.0, "alpha must lie in [0, 1/3], got {!r}", alpha)
         self.set_parameters(0.0, alpha)
 
 
@@ -108,7 +106,6 @@ class Newmark(GeneralizedAlpha):
         self.set_parameters(0.0, 0.0)
         self.beta = require_finite_scalar("beta", beta)
         self.gamma = require_finite_scalar("gamma", gamma)
-        if self.gamma < 0.5 or self.beta < 0.5 * self.gamma:
-            raise InputError(f"unconditional stability needs 2 beta >= gamma >= 1/2, got "
-                             f"beta = {beta!r}, gamma = {gamma!r}")
+        refuse(self.gamma < 0.5 or self.beta < 0.5 * self.gamma, "unconditional stability needs 2 "
+               "beta >= gamma >= 1/2, got beta = {!r}, gamma = {!r}", beta, gamma)
         self.order = 2 if self.gamma == 0.5 else 1

@@ -14,8 +14,8 @@ from ..actions.joints.base import Joint
 from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember
 from ..beam.points import require_body
-from ..core import (Array, ArrayLike, InputError, Place, StrPath, require_finite, require_index,
-                    shown)
+from ..core import (Array, ArrayLike, InputError, Place, StrPath, refuse, require_finite,
+                    require_index, shown)
 from ..equations.system import System
 from ..core.progress import progress_bar
 from ..io import PvdWriter, to_xarray
@@ -341,8 +341,7 @@ class History(MaterialPoints, SpringForces):
         >>> history.plot("displacement", times=[0, 0.05, 0.1]).get_xlabel()
         'x'
         """
-        if not len(self):
-            raise InputError("the history has no instants")
+        refuse(not len(self), "the history has no instants")
         first, last = self.t[0], self.t[-1]
         wanted = np.linspace(first, last, STROBES) if times is None else np.ravel(
             require_finite("times", times))

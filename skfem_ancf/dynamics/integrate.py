@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.archive import Unreadable, read, write
 from ..core import (AncfError, Array, CheckpointError, CheckpointWarning, ConvergenceError,
-                    InputError, Interrupted, ModelWarning, StrPath, require_flag, require_function,
+                    Interrupted, ModelWarning, StrPath, refuse, require_flag, require_function,
                     require_integer, require_path, shown, warn)
 from ..core.progress import progress_bar
 from ..equations.stability import largest_displacement
@@ -46,22 +46,20 @@ def integrate(system: System, scheme: Scheme, start: State | None, u: Array | No
     task = task_of(t_start, **times, sampled=system.forces.sampled)
     # a Frame that is condensed to its nodes stores no dense constraint Jacobians
     size = 24e-9 * system.constraints.m * system.N
-    if size > LARGEST and not (in_steps(scheme) and system.mass_solver.by_nodes):
-        raise InputError(
-            f"time integration stores the derivatives of {system.constraints.m} joint equations by "
-            f"{system.N} degrees of freedom as dense matrices, {size:.3g} GB. A Frame avoids this "
-            "with 'energy-momentum' and 'generalized-alpha', if it is supported at nodes, has no "
-            "other joints, no springs between distant points and no modal damping. Otherwise use "
-            "fewer elements, or scene.modes(k)")
+    refuse(size > LARGEST and not (in_steps(scheme) and system.mass_solver.by_nodes),
+           "time integration stores the derivatives of {} joint equations by {} degrees of freedom "
+           "as dense matrices, {:.3g} GB. A Frame avoids this with 'energy-momentum' and "
+           "'generalized-alpha', if it is supported at nodes, has no other joints, no springs "
+           "between distant points and no modal damping. Otherwise use fewer elements, or "
+           "scene.modes(k)", system.constraints.m, system.N, size)
     if not system.constraints.passing:
         system.constraints.require_independent_joints()
     system.constraints.require_motion()
     if until is not None:
         require_function("until", until, "of a State that returns a number")
-    if checkpoint is not None and (until is not None or require_flag("check", check)):
-        raise InputError("a checkpoint cannot store the function until=, nor the second motion "
-                         "of check=True: leave out checkpoint=, or integrate in parts, "
-                         "start=history.state(-1)")
+    refuse(checkpoint is not None and (until is not None or require_flag("check", check)),
+           "a checkpoint cannot store the function until=, nor the second motion of check=True: "
+           "leave out checkpoint=, or integrate in parts, start=history.state(-1)")
 
     def begun(task, sensors=(), until=None):
         run = Run(system, scheme, task, sensors, until)

@@ -15,7 +15,7 @@ from ..actions.tables import constraint, joint_directions
 from ..beam.strain_energy import gradients_size
 from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core.callbacks import handle_of
-from ..core import I1, Array, ConvergenceError, InputError, SupportError, require_positive, shown
+from ..core import I1, Array, ConvergenceError, SupportError, refuse, require_positive
 from ..core.words import hints
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
@@ -107,9 +107,8 @@ class Integrator:
         self.system, self.scheme, self.limit = system, scheme, np.inf
         self.m = system.constraints.m
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
-        if self.tol >= 1.0:
-            raise InputError("tol is the relative error of the iteration in a step: it must be "
-                             f"less than 1, 1e-6 is coarse; got {shown(tol)}")
+        refuse(self.tol >= 1.0, "tol is the relative error of the iteration in a step: it must be "
+               "less than 1, 1e-6 is coarse; got {!r}", tol)
         if not scheme.conserving:
             alpha_m, alpha_f, beta, _ = scheme.parameters
             kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)

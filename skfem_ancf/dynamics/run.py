@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from ..actions.forces.springs import Turns
-from ..core import (AncfError, Array, CheckpointError, InputError, ModelWarning, ask_number,
+from ..core import (AncfError, Array, CheckpointError, InputError, ModelWarning, ask_number, refuse,
                     require_finite, require_finite_scalar, require_increasing, require_positive,
                     shown, warn)
 from ..equations.system import System
@@ -60,9 +60,8 @@ class StepSize:
 
     def __init__(self, system: System, scheme: Scheme, rtol: float, t_start: float,
                  t_end: float) -> None:
-        if not scheme.adaptive:
-            raise InputError(f"{scheme!r} does not estimate its error: give a step size dt, or use "
-                             "a scheme of the package, all of which support dt='auto'")
+        refuse(not scheme.adaptive, "{!r} does not estimate its error: give a step size dt, or use "
+               "a scheme of the package, all of which support dt='auto'", scheme)
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span, self._averaged = t_end - t_start, scheme.order <= 2
         self._mass = sum(b.total_mass for b in system.members)
@@ -169,21 +168,18 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
             raise InputError(f"dt of {control!r} is too small for a motion of {span:g}")
         breaks += (t_start + control.dt * np.arange(1, np.ceil(span / control.dt))).tolist()
     auto = isinstance(dt, str)
-    if auto and dt != "auto":
-        raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
+    refuse(auto and dt != "auto", 'dt must be a positive number or "auto", got {!r}', dt)
     dt = None if auto else require_positive("dt", dt)
     step = 1e-4 * span if auto else min(dt, span)
     # raise InputError if round-off cannot resolve the steps, or if there are too many
     if step < 1e-100 or t_end > 1e100:  # their squares must not overflow
         raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
                          f"{t_end!r}")
-    if step <= 8 * EPS * max(abs(t_start), abs(t_end)):
-        raise InputError(f"dt = {step!r} is below the round-off of the times {t_start!r} to "
-                         f"{t_end!r}")
+    refuse(step <= 8 * EPS * max(abs(t_start), abs(t_end)), "dt = {!r} is below the round-off of "
+           "the times {!r} to {!r}", step, t_start, t_end)
     steps = (t_end - t_start) / step
-    if steps > MAX_STEPS:
-        raise InputError(f"dt = {step!r} needs {steps:.3g} steps to t_end = {t_end!r}: the limit "
-                         f"is {MAX_STEPS:.0e}")
+    refuse(steps > MAX_STEPS, "dt = {!r} needs {:.3g} steps to t_end = {!r}: the limit is {:.0e}",
+           step, steps, t_end, MAX_STEPS)
     if not auto and dt > 10.0 * span:
         warn(f"dt = {dt:g} is longer than the motion, from t = {t_start:g} to {t_end:g}, which "
              "becomes one step: the first argument is t_end, the second is dt", ModelWarning)
@@ -193,8 +189,7 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
             raise InputError(f"t_eval must lie within [{t_start}, {t_end}], got {shown(t_eval)}")
     tol = None if tol is None else require_positive("tol", tol)
     rtol = require_positive("rtol", rtol)
-    if rtol < MIN_RTOL:
-        raise InputError(f"rtol must be at least {MIN_RTOL:g}, got {rtol!r}")
+    refuse(rtol < MIN_RTOL, "rtol must be at least {:g}, got {!r}", MIN_RTOL, rtol)
     inside = np.unique(require_finite("breakpoints", breaks, (None,)))
     inside = inside[(inside > t_start + 1e-9 * span) & (inside < t_end - 1e-9 * span)]
     return Task(t_start, t_end, None if auto else step, tol, rtol, t_eval, tuple(inside.tolist()))

@@ -14,7 +14,7 @@ from ..beam.layout import WhichBeam
 from ..beam.points import Located
 from ..core.archive import output_file
 from ..core import (Array, CallbackError, CheckpointError, Immutable, InputError, NameUnknown,
-                    StrPath, ask_array, require_flag, require_module, require_path, shown)
+                    StrPath, ask_array, refuse, require_flag, require_module, require_path, shown)
 from ..equations.system import System
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
@@ -58,17 +58,15 @@ class Sensor(Immutable):
         self.recover = require_flag("recover", recover)
         self.what, self.at, self.beam, self.line = what, at, beam, line
         if callable(what) and not isinstance(what, type):
-            if at is not None:
-                raise InputError("a sensor that is a function of the State takes no points: leave "
-                                 f"out at=, got {shown(at)}")
+            refuse(at is not None, "a sensor that is a function of the State takes no points: "
+                   "leave out at=, got {!r}", at)
             return
         known = (*MOVING, *SECTION, *CONTACT, "joint_force", *FIELDS)
         if not isinstance(what, str) or what not in known:
             raise NameUnknown("quantity of a sensor", what, known)
         if what == "joint_force":
-            if not isinstance(at, Joint):
-                raise InputError('a sensor of "joint_force" needs at=joint, one of scene.joints, '
-                                 f"got {shown(at)}")
+            refuse(not isinstance(at, Joint), 'a sensor of "joint_force" needs at=joint, one of '
+                   'scene.joints, got {!r}', at)
         elif at is None and what not in CONTACT:
             raise InputError(f"a sensor of {what!r} needs points of the body: give at=")
 
@@ -87,12 +85,10 @@ def locate(sensor: Sensor, system: System) -> Located | None:
     if callable(sensor.what) or sensor.what in ("joint_force", *CONTACT):
         return None
     found = system.points.find(sensor.at, sensor.beam, sensor.line, sensor.what not in MOVING)
-    if sensor.what in SECTION and len(found.parts) != 1:
-        raise InputError("the points of a sensor of sections must be in one beam: use one sensor "
-                         "for each beam")
-    if sensor.what == "acceleration" and any(part.off_axis for part in found.parts):
-        raise InputError("the acceleration of a cable is known on its axis only: put the sensor "
-                         "on the axis")
+    refuse(sensor.what in SECTION and len(found.parts) != 1, "the points of a sensor of sections "
+           "must be in one beam: use one sensor for each beam")
+    refuse(sensor.what == "acceleration" and any(part.off_axis for part in found.parts),
+           "the acceleration of a cable is known on its axis only: put the sensor on the axis")
     return found
 
 

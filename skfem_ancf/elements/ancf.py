@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..core import (Array, InputError, gauss_lobatto, hermite_basis, is_builtin, read_only,
+from ..core import (Array, gauss_lobatto, hermite_basis, is_builtin, read_only, refuse,
                     require_integer, require_like, require_names, require_option, require_positive)
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.mapping import SECTIONS
@@ -313,8 +313,7 @@ def choose_element(mesh: MeshBeam, material: Any, fields: str | Sequence[str] = 
     require_like("material", material, "Material", "E", "G", "nu")
     fields = require_names("field", fields, ORDER_OF_FIELD)
     tolerance = require_positive("tolerance", tolerance)
-    if tolerance >= 1.0:
-        raise InputError(f"the tolerance is relative and below 1, got {tolerance!r}")
+    refuse(tolerance >= 1.0, "the tolerance is relative and below 1, got {!r}", tolerance)
     ratio = mesh.height / float(mesh.lengths.sum())
     k_s = 10.0 * (1.0 + material.nu) / (12.0 + 11.0 * material.nu)
     shear = 0.25 * material.E / (k_s * material.G) * ratio**2

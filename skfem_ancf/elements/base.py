@@ -10,7 +10,7 @@ from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
 from ..core import (Array, ArrayLike, Immutable, InputError, MeshError, Rule, cached_property,
-                    gauss, gauss_lobatto, hermite_basis, require_finite, shown)
+                    gauss, gauss_lobatto, hermite_basis, refuse, require_finite, shown)
 from ..mesh.mapping import SECTIONS, MappingBeam, nodal_derivatives, turned
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.numbering import RefBeam
@@ -185,12 +185,10 @@ class ElementBeam(Immutable, Element):
         self._along = (sum(across == 0 for _, _, across in self.functionals),
                        1 + max([a for _, a, across in self.functionals if across > 0], default=0))
         across, expected = len(self.functionals) - self._along[0], section.number * self._along[1]
-        if len(names) != len(functionals) or across != expected:
-            raise InputError(
-                f"{type(self).__name__} has {len(names)} names and {len(functionals)} functionals, "
-                f"{across} of them across the section: each name is one, and of each of the "
-                f"{section.number} section functions there is one for each derivative along X, "
-                f"here {expected}")
+        refuse(len(names) != len(functionals) or across != expected, "{} has {} names and {} "
+               "functionals, {} of them across the section: each name is one, and of each of the "
+               "{} section functions there is one for each derivative along X, here {}",
+               type(self).__name__, len(names), len(functionals), across, section.number, expected)
         self.axis_degree = 2 * self._along[0] - 1
         self.sections = SECTIONS[self._along[1] - 1]
         # stock quadrature takes 2 maxdeg in each direction: exact for the energy, which is of

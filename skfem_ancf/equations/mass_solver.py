@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from ..core.band import Band, BandMatrix, dense, factorize, fix, solve_dependent
-from ..core import Array, InputError, shown
+from ..core import Array, refuse
 from .condensation import CondensedMass
 
 #: Number of joint equations above which time integration condenses a frame.
@@ -31,9 +31,8 @@ class MassSolver:
         M = s.new_band().combine(1.0, s.mass, 0.0, s.mass)
         fix(M, s.constraints.fixed)
         if not factorize(M):
-            if s.forces.masses:
-                raise InputError("the mass matrix is singular to round-off: a mass or inertia of "
-                                 f"{shown(s.forces.masses)} is too large compared with the beams")
+            refuse(s.forces.masses, "the mass matrix is singular to round-off: a mass or inertia "
+                   "of {!r} is too large compared with the beams", s.forces.masses)
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         M.factors = Band(*M)
         return M

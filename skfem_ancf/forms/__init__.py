@@ -42,7 +42,7 @@ from skfem.helpers import dot
 from ..actions.energy import Energy, points_of
 from ..beam.kinematics import element_dofs
 from ..beam.solid import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
-from ..core import (Array, ArrayLike, InputError, ask_field, require_finite, require_like,
+from ..core import (Array, ArrayLike, InputError, ask_field, refuse, require_finite, require_like,
                     require_positive)
 from ..formulations import get_formulation
 from ..materials.base import Material
@@ -493,9 +493,8 @@ class _BeamForm:
         """Value inside another form, shape (nelements, npoints)."""
         *functions, w = functions
         r = w.get("r")
-        if not isinstance(r, Position):
-            raise InputError("inside another form the forms of a beam need the position with "
-                             "its degrees of freedom: asm(form, basis, r=forms.position(basis, q))")
+        refuse(not isinstance(r, Position), "inside another form the forms of a beam need the "
+               "position with its degrees of freedom: asm(form, basis, r=forms.position(basis, q))")
         last = self._last
         if last[0] is not r:
             last = self._last = r, self._contributions(r.basis, r=r.q)
@@ -517,9 +516,8 @@ class _BeamForm:
                 and np.array_equal(other_element.doflocs, element.doflocs)
                 and np.array_equal(basis.mesh.p, mesh.p) and basis.mesh.height == mesh.height
                 and np.array_equal(basis.mesh.heights, mesh.heights))
-        if not same:
-            raise InputError(f"this is a form of {self.beam!r}: assemble it on "
-                             f"Basis(beam.mesh, ElementVector(beam.element)), not on {basis!r}")
+        refuse(not same, "this is a form of {!r}: assemble it on Basis(beam.mesh, "
+               "ElementVector(beam.element)), not on {!r}", self.beam, basis)
         r = r.q if isinstance(r, Position) else r
         if other or isinstance(r, DiscreteField) or np.shape(r) != (basis.N,):
             raise InputError(f"pass the degrees of freedom as r=q, a vector of {basis.N} numbers, "
@@ -552,9 +550,8 @@ class _BeamTangent(_BeamForm, BilinearForm):
         return self.beam.kernel.tangents(u)
 
     def _assemble(self, ubasis, vbasis=None, **kwargs):
-        if vbasis is not None and vbasis is not ubasis:
-            raise InputError("trial and test functions of a beam's tangent need the same basis: "
-                             "asm(form, basis, r=q)")
+        refuse(vbasis is not None and vbasis is not ubasis, "trial and test functions of a beam's "
+               "tangent need the same basis: asm(form, basis, r=q)")
         return scattered(self._contributions(ubasis, **kwargs), ubasis)
 
 

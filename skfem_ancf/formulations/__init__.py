@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..core import (Array, Immutable, InputError, Law, Rule, cached_property, gauss, lagrange,
-                    product_rule, read_only, require_finite_scalar, require_like, require_option,
-                    stress_of)
+                    product_rule, read_only, refuse, require_finite_scalar, require_like,
+                    require_option, stress_of)
 from ..elements.base import ElementBeam
 from ..materials import LinearLaw, Material
 from ..materials.history import AtRest
@@ -77,11 +77,9 @@ class Term:
 
 def refuse_rigid_sections(element: ElementBeam, material: Material, law: Law) -> None:
     """Raise InputError for sections of order 1 of a material with a history."""
-    if isinstance(law, AtRest) and element.order == 1:
-        raise InputError(
-            f"{type(material).__name__} has a history, and sections of order 1, which cannot "
-            "contract as they bend, would be 12 to 17 % too stiff with it: use order 2 or more, or "
-            "a cable")
+    refuse(isinstance(law, AtRest) and element.order == 1, "{} has a history, and sections of "
+           "order 1, which cannot contract as they bend, would be 12 to 17 % too stiff with it: "
+           "use order 2 or more, or a cable", type(material).__name__)
 
 
 class Formulation(Immutable):

@@ -12,8 +12,8 @@ import numpy as np
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.outlines import around, outlines
 from ..beam.layout import select_member
-from ..core import (InputError, StrPath, require_finite_scalar, require_flag, require_like,
-                    require_module, require_option, require_path, require_text, shown)
+from ..core import (InputError, StrPath, refuse, require_finite_scalar, require_flag, require_like,
+                    require_module, require_option, require_path, require_text)
 from ..core.archive import output_file
 from ..recovery.fields import FIELDS, find_fields, unit_of, units_of
 from ..recovery.grids import COMPONENTS, body_of, facts_of, grids, in_space
@@ -334,11 +334,9 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
     xarray, wanted = require_module("xarray", "arrays"), find_fields(fields)
     motion = hasattr(solution, "states")
     states = list(solution) if motion else [solution]
-    if not states:
-        raise InputError("the history has no instants")
+    refuse(not states, "the history has no instants")
     if at is None:
-        if line is not None:
-            raise InputError(f"line={shown(line)} is for points: give at=, too")
+        refuse(line is not None, "line={!r} is for points: give at=, too", line)
         tables = [_of_body(state, wanted, subdivide, recover, fields is None, beam)
                   for state in states]
     else:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core import (Array, ArrayLike, Immutable, InputError, Law, gauss, is_builtin, rebuilt,
-                    require_finite, require_finite_scalar, require_like, require_option,
+                    refuse, require_finite, require_finite_scalar, require_like, require_option,
                     require_positive, require_slope, shown)
 from .library import values_of
 
@@ -196,9 +196,8 @@ class Material(Immutable):
         """The law with corrected shear, as a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)
         self._require_number()
-        if not self._fits("stress", "energy"):
-            raise InputError(f"{type(self).__name__} overrides energy and not stress, with which "
-                             "beams are solved: define stress(strain), its derivative, too")
+        refuse(not self._fits("stress", "energy"), "{} overrides energy and not stress, with which "
+               "beams are solved: define stress(strain), its derivative, too", type(self).__name__)
         law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
         if not is_builtin(self):
             _require_derivatives(law, self)
@@ -340,9 +339,8 @@ def _require_derivatives(law, material):
                   energies[2] - energies[1], 2.0 * np.sum(stress * d, axis=0),
                   1e-13 * np.abs(energies[0]).max())
     lowest, *_, highest = np.linalg.eigvalsh(D0.reshape(3, 3, -1)[..., 0])
-    if lowest < -1e-6 * abs(highest):
-        raise InputError(f"moduli(strain) of {type(material).__name__} at zero strain must not be "
-                         f"negative, got the eigenvalue {lowest:.6g}")
+    refuse(lowest < -1e-6 * abs(highest), "moduli(strain) of {} at zero strain must not be "
+           "negative, got the eigenvalue {:.6g}", type(material).__name__, lowest)
 
 
 class OverriddenLaw:

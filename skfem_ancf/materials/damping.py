@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import ArrayLike, Immutable, InputError, require_finite, require_not_negative, shown
+from ..core import ArrayLike, Immutable, refuse, require_finite, require_not_negative
 
 
 class KelvinVoigt(Immutable):
@@ -53,9 +53,8 @@ class Damping(Immutable):
         self.mass = require_not_negative("mass", mass)
         self.stiffness = require_not_negative("stiffness", stiffness)
         self.modal = require_finite("modal", modal, (None,))
-        if np.any(self.modal < 0.0):
-            raise InputError("modal must be damping ratios, zero or positive, of the lowest modes, "
-                             f"got {shown(modal)}")
+        refuse(np.any(self.modal < 0.0), "modal must be damping ratios, zero or positive, of the "
+               "lowest modes, got {!r}", modal)
         self._acts = bool(self.mass or self.stiffness or np.any(self.modal))
 
     def __bool__(self) -> bool:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import (Array, ArrayLike, InputError, require_finite, require_finite_scalar,
+from ..core import (Array, ArrayLike, InputError, refuse, require_finite, require_finite_scalar,
                     require_not_negative, require_positive, shown)
 from .history import ACROSS, HistoryMaterial
 
@@ -104,8 +104,7 @@ class ElasticPlastic(HistoryMaterial):
                  strength: float | tuple[float, float] | None = None) -> None:
         super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, points,
                          strength)
-        if self.nu == 0.5:
-            raise InputError("ElasticPlastic needs nu below 0.5, got 0.5: use 0.49")
+        refuse(self.nu == 0.5, "ElasticPlastic needs nu below 0.5, got 0.5: use 0.49")
         self.yield_stress = require_positive("yield_stress", yield_stress)
         self.kinematic = require_not_negative("kinematic", kinematic)
         self.hardening = self._checked(hardening)
@@ -117,9 +116,8 @@ class ElasticPlastic(HistoryMaterial):
             return hardening
         if np.ndim(hardening) == 0:
             value = require_finite_scalar("hardening", hardening)
-            if value < 0.0:
-                raise InputError(f"hardening must not be negative, got {value:g}: softening, for "
-                                 "which the result would depend on the mesh, is not included")
+            refuse(value < 0.0, "hardening must not be negative, got {:g}: softening, for which "
+                   "the result would depend on the mesh, is not included", value)
             return value
         table = require_finite("hardening", hardening, (None, 2))
         if len(table) < 2 or table[0, 0] != 0.0 or np.any(np.diff(table[:, 0]) <= 0.0) or np.any(

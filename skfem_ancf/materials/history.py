@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, ConvergenceError, InputError, Law, rebuilt, require_integer,
+from ..core import (Array, ConvergenceError, InputError, Law, rebuilt, refuse, require_integer,
                     require_positive, require_slope)
 from .base import LinearLaw, Material, hooke
 
@@ -88,9 +88,8 @@ class HistoryMaterial(Material):
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
                  points: int = ACROSS,
                  strength: float | tuple[float, float] | None = None) -> None:
-        if callable(E):
-            raise InputError(f"{type(self).__name__} has a history, and takes a number for E: give "
-                             "layers of other materials by Section.layers")
+        refuse(callable(E), "{} has a history, and takes a number for E: give layers of other "
+               "materials by Section.layers", type(self).__name__)
         super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, strength)
         self.points = require_integer("points", points, 2, 200)
 

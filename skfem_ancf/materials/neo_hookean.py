@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import Array, InputError, Law, primitive, source
+from ..core import Array, Law, primitive, refuse, source
 from .pointwise import PointwiseMaterial
 
 
@@ -93,8 +93,7 @@ class NeoHookean(PointwiseMaterial):
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
                  strength: float | tuple[float, float] | None = None) -> None:
         super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, strength)
-        if self.nu == 0.5:
-            raise InputError("the compressible neo-Hookean law needs nu below 0.5, got 0.5")
+        refuse(self.nu == 0.5, "the compressible neo-Hookean law needs nu below 0.5, got 0.5")
 
     def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
         # a subclass may have changed the law

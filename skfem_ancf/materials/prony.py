@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import Array, ArrayLike, InputError, require_finite, shown
+from ..core import Array, ArrayLike, InputError, refuse, require_finite, shown
 from .base import Material
 from .history import HistoryMaterial
 
@@ -61,11 +61,9 @@ class Prony(HistoryMaterial):
         self.material, self._law = material, material.law()
         self.shares = np.ravel(require_finite("shares", np.atleast_1d(shares), (None,)))
         self.times = np.ravel(require_finite("times", np.atleast_1d(times), self.shares.shape))
-        if np.any(self.shares <= 0.0) or self.shares.sum() >= 1.0:
-            raise InputError("shares are parts of the instantaneous stiffness: positive, with a "
-                             f"sum below 1, got {shown(shares)}")
-        if np.any(self.times <= 0.0):
-            raise InputError(f"times must be positive, got {shown(times)}")
+        refuse(np.any(self.shares <= 0.0) or self.shares.sum() >= 1.0, "shares are parts of the "
+               "instantaneous stiffness: positive, with a sum below 1, got {!r}", shares)
+        refuse(np.any(self.times <= 0.0), "times must be positive, got {!r}", times)
         self.variables = {"instant": 3, "relaxing": 3 * len(self.shares)}
 
     def __repr__(self) -> str:

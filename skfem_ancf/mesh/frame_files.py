@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (FileError, InputError, MeshError, require_finite, require_module, require_names,
-                    require_option, require_path, shown)
+from ..core import (FileError, InputError, MeshError, refuse, require_finite, require_module,
+                    require_names, require_option, require_path, shown)
 from .frame_graph import FrameGraph
 
 
@@ -53,8 +53,7 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
             elif kind in CURVES:
                 raise MeshError(f"{path} has {kind} in the layer {entity.dxf.layer!r}, which is "
                                 "no straight line: explode blocks, and draw curves as polylines")
-    if not lines:
-        raise MeshError(f"{path} has no lines and no polylines in its model space")
+    refuse(not lines, "{} has no lines and no polylines in its model space", path, error=MeshError)
     at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
     at = at * _scale(drawing.units, unit, path)
     ends, alone = np.split(number.ravel(), [2 * len(lines)])
@@ -74,9 +73,8 @@ def _scale(code, unit, path):
                     f"in {stated}" if stated else "in a unit that it does not state")
         return 1.0
     target = getattr(units, require_option("unit of length", unit, UNITS).upper())
-    if stated is None:
-        raise InputError(f"{path} does not state its unit ($INSUNITS is {code}), so that it cannot "
-                         f"be converted to {unit!r}: leave out unit=, and scale the drawing")
+    refuse(stated is None, "{} does not state its unit ($INSUNITS is {}), so that it cannot be "
+           "converted to {!r}: leave out unit=, and scale the drawing", path, code, unit)
     return units.conversion_factor(code, target)
 
 
@@ -94,10 +92,9 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     points = require_finite("the points of the mesh", mesh.points)
     kinds = {block.type for block in mesh.cells}
     odd = sorted(kind for kind in kinds if kind != "vertex" and not LINE.fullmatch(kind))
-    if odd:
-        raise MeshError(f"the mesh has cells of the kinds {odd}, which are no lines: a frame is "
-                        "made of 'line', 'line3', 'line4', ..., and 'vertex' names nodes; leave "
-                        "the others out of the mesh")
+    refuse(odd, "the mesh has cells of the kinds {}, which are no lines: a frame is made of "
+           "'line', 'line3', 'line4', ..., and 'vertex' names nodes; leave the others out of the "
+           "mesh", odd, error=MeshError)
     blocks = {k: block for k, block in enumerate(mesh.cells) if LINE.fullmatch(block.type)}
     cells = [_ends_first(points, cell) for block in blocks.values()
              for cell in np.asarray(block.data, dtype=np.int64)]
@@ -146,9 +143,8 @@ def _mesh_of(mesh, unit):
             raise FileError(f"{path} cannot be read as a mesh: {error}") from None
         if path.suffix.lower() == ".inp":
             _require_sets_of_abaqus(path)
-    if unit is not None:
-        raise InputError(f"unit={shown(unit)} is for drawings in DXF, which state theirs: other "
-                         "meshes are taken as they are")
+    refuse(unit is not None, "unit={!r} is for drawings in DXF, which state theirs: other meshes "
+           "are taken as they are", unit)
     if not isinstance(mesh, meshio.Mesh):
         raise InputError(f"mesh must be a meshio.Mesh or the name of a file, got {shown(mesh)}")
     return mesh
@@ -198,10 +194,9 @@ def _names(mesh, blocks, used, wanted):
             if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
     groups, found = {}, dict[str, list[Any]]()
     for name, parts in sets.items():
-        if len(parts) > len(mesh.cells):
-            raise MeshError(f"the cell set {name!r} has {len(parts)} parts, the mesh "
-                            f"{len(mesh.cells)} blocks of cells: it is a set of sets; name the "
-                            "cells themselves")
+        refuse(len(parts) > len(mesh.cells), "the cell set {!r} has {} parts, the mesh {} blocks "
+               "of cells: it is a set of sets; name the cells themselves", name, len(parts),
+               len(mesh.cells), error=MeshError)
         parts = {k: _entries(name, part, len(mesh.cells[k].data)) for k, part in enumerate(parts)
                  if part is not None}
         some = [blocks[k][part] for k, part in parts.items() if k in blocks and len(part)]

@@ -11,7 +11,7 @@ import scipy
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..core import (Array, InputError, MeshError, ModelWarning, NameUnknown, ask_field,
+from ..core import (Array, InputError, MeshError, ModelWarning, NameUnknown, ask_field, refuse,
                     require_finite, require_integer, require_label, require_moderate,
                     require_not_negative, require_unmasked, shown, warn)
 from .curve import Curve
@@ -156,8 +156,7 @@ class FrameGraph:
         self.points = _pairs("points", points).astype(float)
         require_moderate("points", self.points)
         ends = _pairs("lines", lines)
-        if np.any(ends != np.floor(ends)):
-            raise InputError(f"lines are numbers of points, got {shown(lines)}")
+        refuse(np.any(ends != np.floor(ends)), "lines are numbers of points, got {!r}", lines)
         self.lines = ends.astype(np.int64)
         n, m = self.points.shape[1], self.lines.shape[1]
         self.groups = _named("group", "lines", groups, m)
@@ -250,16 +249,14 @@ class FrameGraph:
         self.distinct = np.flatnonzero(self.lines[0] != self.lines[1])
         # move the ends of curves to merged nodes
         for k, curve in self.curves.items():
-            if k not in self.distinct:
-                raise MeshError(f"the ends of line {k}, which has a curve, are not farther apart "
-                                f"than tol = {self.tol:.3g}, within which points are one node: "
-                                "give a smaller tol=")
+            refuse(k not in self.distinct, "the ends of line {}, which has a curve, are not "
+                   "farther apart than tol = {:.3g}, within which points are one node: give a "
+                   "smaller tol=", k, self.tol, error=MeshError)
             shift = (self.points - places)[:, self.given[:, k]]
             if np.any(shift):
                 self.curves[k] = partial(_moved, curve, shift)
-        if not len(self.distinct):
-            raise MeshError(f"all lines are shorter than tol = {self.tol:.3g}, within which points "
-                            "are one node")
+        refuse(not len(self.distinct), "all lines are shorter than tol = {:.3g}, within which "
+               "points are one node", self.tol, error=MeshError)
         if tol is None:
             _warn_of(pairs[one], apart[one], f"are one node, as they are not farther apart than "
                      f"tol = {self.tol:.3g}: give tol= for another distance, tol=0 to keep them "

@@ -14,7 +14,7 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
-from ..core import archive
+from ..core import archive, refuse
 from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, NameUnknown,
                     StrPath, cached_property, is_builtin, packed, require_finite,
                     require_finite_scalar, require_function, require_integer, require_moderate,
@@ -187,8 +187,7 @@ class MeshBeam(NumberedMesh):
         True
         """
         s = require_finite("s", s, (None,))
-        if len(s) < 2:
-            raise MeshError(f"a beam needs at least two nodes, got {len(s)}")
+        refuse(len(s) < 2, "a beam needs at least two nodes, got {}", len(s), error=MeshError)
         if not np.all(np.diff(s) > 0):
             k = int(np.argmin(np.diff(s)))
             raise MeshError(f"the parameters of the nodes must increase: s[{k}] = {s[k]:.9g}, "
@@ -297,10 +296,9 @@ class MeshBeam(NumberedMesh):
             if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
                 raise MeshError(f"t must contain node numbers, got {shown(self.t)}")
         shape = np.shape(self.t)
-        if len(shape) != 2 or shape[0] != 2 or shape[1] == 0:
-            raise MeshError(
-                f"a MeshBeam has two nodes per element and at least one element, t has shape "
-                f"{shape}; for quads use mesh.to_meshquad()")
+        refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "a MeshBeam has two nodes per "
+               "element and at least one element, t has shape {}; for quads use mesh.to_meshquad()",
+               shape, error=MeshError)
         super().__post_init__()
         if self.height is None:  # as Basis.refinterp makes it
             raise MeshError(
@@ -318,9 +316,8 @@ class MeshBeam(NumberedMesh):
             raise MeshError(f"every node of a MeshBeam is part of an element: there are "
                             f"{p.shape[1]} nodes, and node {odd[0]} is only in "
                             f"{'t' if odd[0] in t else 'the nodes'}")
-        if self.p_X is None:
-            raise MeshError("a MeshBeam needs the tangents p_X of its axis, and more: build it "
-                            "with MeshBeam.init_line or init_curve")
+        refuse(self.p_X is None, "a MeshBeam needs the tangents p_X of its axis, and more: build "
+               "it with MeshBeam.init_line or init_curve", error=MeshError)
         for name, wanted in (("p_X", p.shape), ("p_Y", p.shape), ("p_XY", p.shape),
                              ("lengths", shape[1:]), ("heights", (4, shape[1]))):
             value = getattr(self, name)
@@ -540,8 +537,7 @@ class MeshBeam(NumberedMesh):
         at = points_of_rows(at)
         if isinstance(at, str) or is_point(at) or not isinstance(at, (tuple, list, set, frozenset)):
             at = [at]
-        if not at:
-            raise InputError("at names no section: give 'left', 'right', or a point of the axis")
+        refuse(not at, "at names no section: give 'left', 'right', or a point of the axis")
         places, mesh = np.array([as_point(place, self) for place in at]), self
         self.element_finder()(*places.T)
         while True:
@@ -705,8 +701,7 @@ class MeshBeam(NumberedMesh):
         try:
             data = archive.read(path)
             missing = sorted(set(NEEDED) - data.keys())
-            if missing:
-                raise MeshError(f"{missing} are missing")
+            refuse(missing, "{} are missing", missing, error=MeshError)
             kind = str(data.get("kind", cls.kind))
             if kind not in kinds:
                 raise MeshError(f"its kind {kind!r} is not known, only {sorted(kinds)}")

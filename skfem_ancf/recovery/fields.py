@@ -21,7 +21,7 @@ from ..beam.points import BeamPoints
 from ..beam.remembered import by_history, remembers
 from ..beam.solid import displacement_strain
 from ..beam.strains import stress_at, stretched
-from ..core import (Array, CallbackError, InputError, NameUnknown, ask, first_order,
+from ..core import (Array, CallbackError, InputError, NameUnknown, ask, first_order, refuse,
                     require_finite_scalar, require_flag, require_integer, require_label,
                     require_text, shown, step, stress_of)
 from ..materials import LinearLaw
@@ -76,9 +76,8 @@ class Field:
     def __post_init__(self) -> None:
         if require_label("the name of a field", self.name) is None:
             raise InputError(f"the name of a field must be a text, got {shown(self.name)}")
-        if not callable(self.function):
-            raise InputError("the function of a field takes Values and returns an array, got "
-                             f"{shown(self.function)}")
+        refuse(not callable(self.function), "the function of a field takes Values and returns an "
+               "array, got {!r}", self.function)
         require_integer("components", self.components, 1, 3)
         for name in ("title", "unit", "frame"):
             if require_text(name, getattr(self, name)) is None:
@@ -548,8 +547,7 @@ def find_fields(fields: Any, beams: Sequence[Any] = ()) -> list[Field]:
         raise InputError(f"fields must be a list of names or functions, got {shown(fields)}")
     found = [find_field(field) for field in fields]
     names = [field.name for field in found]
-    if len(set(names)) < len(names):
-        raise InputError(f"the fields must have different names, got {names}")
+    refuse(len(set(names)) < len(names), "the fields must have different names, got {}", names)
     return found
 
 

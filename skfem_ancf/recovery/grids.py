@@ -12,7 +12,8 @@ import numpy as np
 
 from ..beam.beam import Beam
 from ..beam.domain import drawn
-from ..core import Array, InputError, require_flag, require_integer, require_like, shown, tensor
+from ..core import (Array, InputError, refuse, require_flag, require_integer, require_like, shown,
+                    tensor)
 from .fields import DomainValues, Field, Values, values_on_grid
 
 #: VTK cell numbers by meshio's names.
@@ -136,9 +137,8 @@ def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
 def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
     """Points of an element's Lagrange cell, and their VTK order."""
     p = max(min(beam.element.axis_degree, MAX_LAGRANGE_DEGREE), beam.element.order)
-    if p > MAX_LAGRANGE_DEGREE:
-        raise InputError(f"VTK evaluates Lagrange cells up to degree {MAX_LAGRANGE_DEGREE}, this "
-                         f"element has {p}: use subdivide= instead of lagrange=True")
+    refuse(p > MAX_LAGRANGE_DEGREE, "VTK evaluates Lagrange cells up to degree {}, this element "
+           "has {}: use subdivide= instead of lagrange=True", MAX_LAGRANGE_DEGREE, p)
     k = np.arange((p + 1) ** 2).reshape(p + 1, p + 1)  # [xi, eta]
     inner = slice(1, -1)
     # corners, edges in the direction of increasing xi and eta, the interior with xi fastest

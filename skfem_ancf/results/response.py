@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ..core import Array, ArrayLike, InputError, NameUnknown, NearMisses, StrPath, require_index
+from ..core import (Array, ArrayLike, InputError, NameUnknown, NearMisses, StrPath, refuse,
+                    require_index)
 from ..visuals.matplotlib import dress, new_axes, page
 from ..visuals.scenery import MUTED
 
@@ -104,8 +105,7 @@ class FrequencyResponse(NearMisses):
 
         if axes is None:
             axes = new_axes((6.0, 4.4), 2, 1, sharex=True, height_ratios=(2, 1))
-        if np.shape(axes) != (2,):
-            raise InputError("axes must be two matplotlib Axes, as plot() returns them")
+        refuse(np.shape(axes) != (2,), "axes must be two matplotlib Axes, as plot() returns them")
         positive = self.frequencies > 0.0
         w, values = self.frequencies[positive], values[positive]
         axes[0].loglog(w, np.abs(values), lw=1.4, label=label)

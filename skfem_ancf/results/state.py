@@ -22,7 +22,7 @@ from ..beam.domain import Domain, DomainPoints
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
 from ..core import (Array, Immutable, InputError, NameUnknown, NearMisses, Place, cached_property,
-                    first_order, require_flag, require_integer, shown, step)
+                    first_order, refuse, require_flag, require_integer, step)
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
 from ..equations.system import System
@@ -159,9 +159,8 @@ class Derivatives:
         return self._derivatives(wrt).of_displacements()
 
     def _derivatives(self, wrt, readings=()):
-        if self.system.derivatives is None:
-            raise InputError("this state does not know its scene, as after a pickle: solve it "
-                             "again, or use a skfem_ancf.Design")
+        refuse(self.system.derivatives is None, "this state does not know its scene, as after a "
+               "pickle: solve it again, or use a skfem_ancf.Design")
         return self.system.derivatives(self, wrt, readings)
 
 
@@ -709,9 +708,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         sections = require_integer("sections", sections, 2, 10000)
         if at is not None:
             found = self.system.points.find(at, beam, line, ask=True)
-            if len(found.parts) != 1:
-                raise InputError("the points are in several beams: ask for the resultants of each, "
-                                 "with beam=")
+            refuse(len(found.parts) != 1, "the points are in several beams: ask for the resultants "
+                   "of each, with beam=")
             part, one = found.parts[0], found.one
             k, places = part.number, (part.e, part.X[0])
         else:
@@ -801,9 +799,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         holds = (~system.constraints.free | touched)[s].reshape(-1, member.nd)[nodes].any(axis=0)
         names = {n: float(v) for n, v, held in zip(
             member.dofnames, np.tensordot(one, forces, 1).ravel(), holds) if held}
-        if frame is not None and not names:
-            raise InputError(f"no support of beam {shown(beam)} at {shown(boundary)}: for "
-                             "supports of a frame give its nodes, without beam=")
+        refuse(frame is not None and not names, "no support of beam {!r} at {!r}: for supports of "
+               "a frame give its nodes, without beam=", beam, boundary)
         return Reaction(one @ forces[:, 0], float(moment), names)
 
     def _support_force(self):

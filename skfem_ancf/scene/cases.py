@@ -10,8 +10,8 @@ import numpy as np
 
 from ..actions.loads import Load
 from ..beam.layout import WhichBeam, select_beam
-from ..core import (AncfError, Array, InputError, NameUnknown, require_finite_scalar, require_like,
-                    shown)
+from ..core import (AncfError, Array, InputError, NameUnknown, refuse, require_finite_scalar,
+                    require_like)
 from ..results.output import supports_of
 from ..results.state import State
 from .scene import Scene
@@ -93,17 +93,15 @@ class LoadCases(Mapping):
             combinations = {name: {name: 1.0} for name in self.cases}
         self.combinations = {}
         for name, factors in dict(combinations).items():
-            if not isinstance(factors, Mapping):
-                raise InputError(f"combination {name!r} must have factors of cases by name, as "
-                                 f"{{'self': 1.35}}, got {shown(factors)}")
+            refuse(not isinstance(factors, Mapping), "combination {!r} must have factors of cases "
+                   "by name, as {{'self': 1.35}}, got {!r}", name, factors)
             for case in factors:
                 if case not in self.cases:
                     raise NameUnknown("load case", case, self.cases)
             self.combinations[name] = {case: require_finite_scalar(f"factor of {case!r}", factor)
                                        for case, factor in factors.items()}
-        if not self.combinations:
-            raise InputError("there is no load case: give functions by name, as "
-                             "{'snow': lambda scene: scene.line_load((0, -1e3))}")
+        refuse(not self.combinations, "there is no load case: give functions by name, as {'snow': "
+               "lambda scene: scene.line_load((0, -1e3))}")
         self._states: dict[str, State] = {}
 
     def factored(self, name: str) -> Scene:
@@ -220,9 +218,8 @@ class LoadCases(Mapping):
 
 def _loads_of(scene, name, add):
     """The entries that a function adds to a copy of a scene; only loads."""
-    if not callable(add):
-        raise InputError(f"load case {name!r} must be a function that adds loads to a scene, as "
-                         f"lambda scene: scene.line_load((0, -1e3)), got {shown(add)}")
+    refuse(not callable(add), "load case {!r} must be a function that adds loads to a scene, as "
+           "lambda scene: scene.line_load((0, -1e3)), got {!r}", name, add)
     other = copy(scene)
     add(other)
     entries = other._entries[len(scene._entries):]

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from ..actions.bound import derivative
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, NameUnknown, ask, ask_array,
-                    require_finite, require_function, require_module, shown)
+                    refuse, require_finite, require_function, require_module)
 from ..core.band import NO_FACTORS
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
@@ -185,8 +185,7 @@ class Design:
 
     def _scene(self, p):
         scene = ask("build(p)", self.build, p)
-        if not hasattr(scene, "solve_static"):
-            raise InputError(f"build(p) must return a Scene, got {shown(scene)}")
+        refuse(not hasattr(scene, "solve_static"), "build(p) must return a Scene, got {!r}", scene)
         return scene
 
     def _sensors(self, scene):
@@ -291,10 +290,9 @@ class Design:
         eigenvalue has rows whose sum it is."""
         scene = self._scene(p)
         system, old = scene.system, self._built.system
-        if system.N != old.N or system.constraints.m != old.constraints.m:
-            raise InputError("the parameters change the number of degrees of freedom or of joint "
-                             f"equations, from {old.N} and {old.constraints.m} "
-                             f"to {system.N} and {system.constraints.m}")
+        refuse(system.N != old.N or system.constraints.m != old.constraints.m, "the parameters "
+               "change the number of degrees of freedom or of joint equations, from {} and {} to "
+               "{} and {}", old.N, old.constraints.m, system.N, system.constraints.m)
         parts, seen = [np.zeros(0)], self._values
         if state is not None:
             u, l = np.array(state.u), state.multipliers
@@ -412,9 +410,8 @@ class Gradient(Design):
 
 def require_smooth(state: State) -> None:
     """Raise InputError if forces depend on the path."""
-    if state.system.histories.dissipates:
-        raise InputError("forces of this scene depend on the path (friction, plasticity): the "
-                         "derivative of a reading depends on the direction, and is not defined")
+    refuse(state.system.histories.dissipates, "forces of this scene depend on the path (friction, "
+           "plasticity): the derivative of a reading depends on the direction, and is not defined")
 
 
 def require_regular(state: State, force: Array, soft: Array) -> None:

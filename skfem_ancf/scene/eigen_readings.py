@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from ..core import Array, InputError, require_flag, require_integer
+from ..core import Array, InputError, refuse, require_flag, require_integer
 from ..equations.matrices import matrices_of
 from ..equations.strain_tangent import Inverse, StrainTangent
 from ..results.state import State
@@ -128,9 +128,8 @@ class Frequency(EigenReading):
     def _freeze(self, scene: Any, found: Any) -> Frozen:
         values, system, state = found.eigenvalues, scene.system, found.state
         mu, omega = values[self.number].real, found.frequencies[self.number].real
-        if found.flutter or not system.symmetric:
-            raise InputError("the loads have no potential: derivatives of frequencies need a "
-                             "symmetric stiffness, so use differences of values")
+        refuse(found.flutter or not system.symmetric, "the loads have no potential: derivatives of "
+               "frequencies need a symmetric stiffness, so use differences of values")
         if abs(mu) <= 1e2 * eigen.ROUND_OFF**2 * system.scales.bending_eigenvalue:
             raise InputError(f"{self!r} is that of a rigid motion, zero for all parameters: give "
                              "a higher number, or supports")
@@ -154,9 +153,8 @@ class BucklingLoad(EigenReading):
     def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
         c = scene.system.constraints
         found = scene.buckling(min(self.number + 2, int(c.free.sum()) - c.m))
-        if len(found.factors) <= self.number:
-            raise InputError(f"{self!r} does not exist: these loads have {len(found.factors)} "
-                             "positive factors of buckling")
+        refuse(len(found.factors) <= self.number, "{!r} does not exist: these loads have {} "
+               "positive factors of buckling", self, len(found.factors))
         return float(found.factors[self.number]), found
 
     def _freeze(self, scene: Any, found: Any) -> Frozen:
@@ -218,16 +216,14 @@ class CriticalLoad(EigenReading):
 
     def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
         points = scene.continuation(**self.options).critical_points
-        if len(points) <= self.number:
-            raise InputError(f"{self!r} does not exist: the path has {len(points)} critical points."
-                             " Follow it further, by steps= or max_load=")
+        refuse(len(points) <= self.number, "{!r} does not exist: the path has {} critical points. "
+               "Follow it further, by steps= or max_load=", self, len(points))
         return float(points[self.number].load), points[self.number]
 
     def _freeze(self, scene: Any, found: Any) -> Frozen:
         system, state, load = scene.system, found.state, found.load
-        if not system.symmetric or system.histories.dissipates:
-            raise InputError("derivatives of critical loads are of scenes with a potential: no "
-                             "follower loads, friction or plasticity")
+        refuse(not system.symmetric or system.histories.dissipates, "derivatives of critical loads "
+               "are of scenes with a potential: no follower loads, friction or plasticity")
         u, l = np.array(state.u), state.multipliers
         vector = np.append(found.mode, found.critical.multiplier_rate)
         K, J = matrices_of(system, state)[2::2]

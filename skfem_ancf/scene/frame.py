@@ -14,7 +14,7 @@ from ..actions.symbols import Symbol, at_node, force_symbol
 from ..beam import Beam, RigidBody
 from ..beam.kinematics import direction
 from ..beam.layout import Layout, WhichBeam, WhichMember
-from ..core import (Array, ArrayLike, InputError, TimeFunction, require_finite,
+from ..core import (Array, ArrayLike, InputError, TimeFunction, refuse, require_finite,
                     require_finite_scalar, require_function, require_integer, require_names,
                     require_option, require_options, require_positive, require_unmasked, shown)
 from ..elements import ElementBeam, ElementBeamCable
@@ -336,8 +336,7 @@ class Frame(Scene):
             Nodes, see :meth:`nodes`, and some of "x", "y" and "angle", or a list of these.
         """
         names = [name for one in what for name in require_names("fixed component", one, COMPONENTS)]
-        if not names:
-            raise InputError('name what is held: "x", "y" or "angle", as hold(0, "x", "y")')
+        refuse(not names, 'name what is held: "x", "y" or "angle", as hold(0, "x", "y")')
         return self._hold(place, names)
 
     def _hold(self, place, names, settlements=None):
@@ -378,9 +377,8 @@ class Frame(Scene):
         0.0012
         """
         given = {name: value for name, value in zip(COMPONENTS, (x, y, angle)) if value is not None}
-        if not given:
-            raise InputError("settle() needs a displacement: give x=, y= or angle=, a number or a "
-                             "function of time")
+        refuse(not given, "settle() needs a displacement: give x=, y= or angle=, a number or a "
+               "function of time")
         settlements, nodes = self._nodes.settlements, self.nodes(place)
         for name, value in given.items():
             settlements = settlements.given(nodes, COMPONENTS.index(name), require_function(
@@ -510,9 +508,8 @@ class Frame(Scene):
 
 
 def _no_beam(beam):
-    if beam is not None:
-        raise InputError("a frame is supported and loaded at nodes, got beam="
-                         f"{shown(beam)}: give a name, a number, or a point (x, y)")
+    refuse(beam is not None, "a frame is supported and loaded at nodes, got beam={!r}: give a "
+           "name, a number, or a point (x, y)", beam)
 
 
 def _heights(height, lines):
@@ -521,10 +518,9 @@ def _heights(height, lines):
         return height
     if not isinstance(height, (list, tuple)) and np.ndim(height) != 1:
         return require_finite_scalar("height", height)
-    if len(height) != len(lines):
-        raise InputError(f"height has {len(height)} entries for {len(lines)} line(s): give a "
-                         "number, a function of s from 0 to 1 along each line, or a list with one "
-                         "of these for each line; one given in sections for each of the group")
+    refuse(len(height) != len(lines), "height has {} entries for {} line(s): give a number, a "
+           "function of s from 0 to 1 along each line, or a list with one of these for each line; "
+           "one given in sections for each of the group", len(height), len(lines))
     return [one if callable(one) else require_positive(f"height of line {k}", one)
             for k, one in zip(lines, height)]
 
@@ -537,10 +533,9 @@ def _hinged(graph, hinges):
         return ~out
     if isinstance(hinges, (str, int, np.integer)):
         hinges = [hinges]
-    if not isinstance(hinges, (list, tuple, set, frozenset)) and not (
-            isinstance(hinges, np.ndarray) and hinges.ndim):
-        raise InputError('hinges are "all", or a list of nodes and of pairs (line, node), got '
-                         f"{shown(hinges)}")
+    refuse(not isinstance(hinges, (list, tuple, set, frozenset)) and not (
+                isinstance(hinges, np.ndarray) and hinges.ndim), 'hinges are "all", or a list of '
+           'nodes and of pairs (line, node), got {!r}', hinges)
     for one in hinges:
         if isinstance(one, (tuple, list, np.ndarray)) and len(one) == 2:
             line, node = (int(graph.lines_of(one[0])[0]), int(graph.points_at(one[1])[0]))
@@ -548,9 +543,8 @@ def _hinged(graph, hinges):
             if not np.any(at):
                 raise InputError(f"line {line} does not end at node {node}: it joins "
                                  f"{lines[:, line].tolist()}")
-            if line not in graph.distinct:
-                raise InputError(f"line {line} cannot be hinged: its ends are one node, as they "
-                                 f"are not farther apart than tol = {graph.tol:.3g}")
+            refuse(line not in graph.distinct, "line {} cannot be hinged: its ends are one node, "
+                   "as they are not farther apart than tol = {:.3g}", line, graph.tol)
             out[at, line] = True
         else:
             out |= np.isin(lines, graph.points_at(one))

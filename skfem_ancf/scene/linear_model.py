@@ -13,7 +13,8 @@ from scipy.sparse.linalg import splu
 
 from ..actions.loads import Load
 from ..beam.points import BeamPoints
-from ..core import Array, ArrayLike, InputError, SupportError, require_finite, require_integer
+from ..core import (Array, ArrayLike, InputError, SupportError, refuse, require_finite,
+                    require_integer)
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
 from ..results.response import FrequencyResponse
@@ -90,10 +91,9 @@ class LinearModel:
         self.state, self._system = state, system
         self.matrices = matrices_of(system, state)
         self._free = system.constraints.free
-        if np.any(state.v):
-            raise InputError("a linear model is about a state at rest, and this one moves: use "
-                             "the equilibrium, of a steady rotation that in a rotating frame, see "
-                             "skfem_ancf.RotatingFrame")
+        refuse(np.any(state.v), "a linear model is about a state at rest, and this one moves: use "
+               "the equilibrium, of a steady rotation that in a rotating frame, see "
+               "skfem_ancf.RotatingFrame")
         columns = [(name, _columns(system, state, *item)) for name, *item in inputs]
         self.inputs = [label for name, c in columns for label in _labels(name, len(c))]
         self.B, self.G, self.prescribed = (
@@ -139,11 +139,10 @@ class LinearModel:
         A = np.block([[np.zeros((n, n)), np.eye(n)], [lower]])
         u, v, a, _ = self.readings
         moved = U - T @ shift
-        if np.any(np.abs((v + a) @ moved) + np.abs(a @ T @ rate) > DIRECT * np.abs(
-                v + a) @ np.abs(U)):
-            raise InputError("the velocity or acceleration of an output depends on the rate of a "
-                             "prescribed motion, which is no input: read displacements, or use "
-                             "frequency_response()")
+        refuse(np.any(np.abs((v + a) @ moved) + np.abs(a @ T @ rate) > DIRECT * np.abs(
+                    v + a) @ np.abs(U)), "the velocity or acceleration of an output depends on the "
+               "rate of a prescribed motion, which is no input: read displacements, or use "
+               "frequency_response()")
         C = np.hstack([u @ T, v @ T]) + a @ T @ lower
         through = a @ T @ force + u @ moved + v @ T @ rate
         if modes is not None:
@@ -160,8 +159,7 @@ class LinearModel:
         return U, [T.T @ (A @ U) for A in (self._mass(), *self.matrices[1:3])]
 
     def _mass(self):
-        if self.matrices.M is None:
-            raise InputError("a material has no density: give density= of the material")
+        refuse(self.matrices.M is None, "a material has no density: give density= of the material")
         return self.matrices.M
 
     def _reduced(self):
@@ -176,9 +174,8 @@ class LinearModel:
         """The same of the lowest modes."""
         found = eigen.modes(self._system, self.state, require_integer("modes", k, 1))
         T = found.shapes.T
-        if np.iscomplexobj(T):
-            raise InputError("the loads have no potential, and modes are complex: use "
-                             "state_space() without modes")
+        refuse(np.iscomplexobj(T), "the loads have no potential, and modes are complex: use "
+               "state_space() without modes")
         K = np.diag(found.eigenvalues.real) if self._system.symmetric else (
             T.T @ (self.matrices.K @ T))
         return np.eye(k), T.T @ (self.matrices.D @ T), K, T
@@ -206,8 +203,7 @@ class LinearModel:
             :meth:`state_space`: faster for many frequencies well below the last of them.
         """
         omega = np.atleast_1d(require_finite("frequencies", frequencies))
-        if omega.ndim != 1:
-            raise InputError(f"frequencies must be an array (n,), got the shape {omega.shape}")
+        refuse(omega.ndim != 1, "frequencies must be an array (n,), got the shape {}", omega.shape)
         missing = "" if omega.all() else self._system.constraints.missing_supports
         if missing:
             raise SupportError(f"there is no static response, at the frequency 0: {missing}")

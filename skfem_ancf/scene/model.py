@@ -27,7 +27,7 @@ from ..actions.supports import Clamp, Pin, Support
 from ..beam import Beam, RigidBody
 from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichMember
-from ..core import ArrayLike, InputError, NearMisses, TimeFunction, require_text, shown
+from ..core import ArrayLike, InputError, NearMisses, TimeFunction, refuse, require_text, shown
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh
 
@@ -225,10 +225,9 @@ class Model(NearMisses):
         >>> ax = state.plot("S_xx")                                 # $S_{xx}$ (MPa)
         """
         for name, value in (("force", force), ("length", length)):
-            if not require_text(name, value) or value in OTHER[name]:
-                raise InputError(f"{name} must be the name of a unit of {name}, got "
-                                 f"{shown(value)}: the order is units(force, length), as "
-                                 'units("N", "mm")')
+            refuse(not require_text(name, value) or value in OTHER[name], '{} must be the name of '
+                   'a unit of {}, got {!r}: the order is units(force, length), as units("N", "mm")',
+                   name, name, value)
         self._units = (force, length)
         return self
 
@@ -387,10 +386,9 @@ class Model(NearMisses):
 
     def _on(self, beams):
         """The same on other beams."""
-        if (not isinstance(beams, (list, tuple)) or len(beams) != len(self.beams)
-                or not all(isinstance(beam, Beam) for beam in beams)):
-            raise InputError(f"beams must be a list of {len(self.beams)} Beam(s), got "
-                             f"{shown(beams)}")
+        refuse(not isinstance(beams, (list, tuple)) or len(beams) != len(self.beams)
+                   or not all(isinstance(beam, Beam) for beam in beams), "beams must be a list of "
+               "{} Beam(s), got {!r}", len(self.beams), beams)
         scene = self._bare(beams)
         added = self.items[len(scene._entries):]
         changed = {k for k, (a, b) in enumerate(zip(self.beams, beams)) if a.mesh is not b.mesh}
@@ -398,10 +396,9 @@ class Model(NearMisses):
             which = getattr(item, "beam", None)
             for name in ("boundary", "at", "side"):
                 place = getattr(item, name, None)
-                if not on_other_mesh(place) and (which is None or self.layout.number(
-                        which) in changed):
-                    raise InputError(f"{item!r} is at facets given by numbers, {place!r}, and "
-                                     "cannot be put on another mesh: give names or functions")
+                refuse(not on_other_mesh(place) and (which is None or self.layout.number(
+                            which) in changed), "{!r} is at facets given by numbers, {!r}, and "
+                       "cannot be put on another mesh: give names or functions", item, place)
         scene._damping, scene._units = self._damping, self._units
         scene._put(*added)
         return scene

@@ -16,8 +16,8 @@ from ..actions.bound import BoundConstraint, BoundForce, derivative
 from ..actions.loads import Unscaled
 from ..actions.tables import mean_external_force
 from ..beam.kinematics import element_dofs, entries_of
-from ..core import (Array, ArrayLike, InputError, NameUnknown, require_flag, require_integer,
-                    require_positive)
+from ..core import (Array, ArrayLike, InputError, NameUnknown, refuse, require_flag,
+                    require_integer, require_positive)
 from ..dynamics import GeneralizedAlpha, get_scheme
 from ..dynamics.base import Motion, Scheme, in_steps
 from ..dynamics.history import state_of
@@ -119,21 +119,19 @@ class MotionDesign(Design):
         self.every = require_integer("every", every, 1)
         self.t_end, self.dt = require_positive("t_end", t_end), require_positive("dt", dt)
         self.scheme, self.static = get_scheme(scheme), require_flag("static", static)
-        if not (isinstance(self.scheme, GeneralizedAlpha)
-                or self.scheme.conserving and in_steps(self.scheme)):
-            raise InputError("derivatives of a motion need one equation for each step: the scheme "
-                             "'generalized-alpha', 'hht', 'newmark' or 'energy-momentum', without "
-                             f"stages or parts of a step; got {self.scheme!r}")
+        refuse(not (isinstance(self.scheme, GeneralizedAlpha)
+                    or self.scheme.conserving and in_steps(self.scheme)), "derivatives of a motion "
+               "need one equation for each step: the scheme 'generalized-alpha', 'hht', 'newmark' "
+               "or 'energy-momentum', without stages or parts of a step; got {!r}", self.scheme)
         self.history: Any = None
         self._static = self.static
 
     def _begin(self, p, scene, state):
         """Integrate at p."""
         system = scene.system
-        if system.histories.values.size or system.forces.contacts.obstacles or (
-                system.forces.changing):
-            raise InputError("derivatives of a motion are of smooth forces without a history: this "
-                             "scene has contact, friction or a material with a history")
+        refuse(system.histories.values.size or system.forces.contacts.obstacles or (
+                    system.forces.changing), "derivatives of a motion are of smooth forces without "
+               "a history: this scene has contact, friction or a material with a history")
         own = [joint for joint in system.constraints.joints if self.scheme.conserving and (
             type(joint).mean_entries is not BoundConstraint.mean_entries)]
         if own:
@@ -146,9 +144,8 @@ class MotionDesign(Design):
         n = max(1, round(self.t_end / self.dt))
         kept = None if self.every == 1 else self.dt * np.append(np.arange(0, n, self.every), n)
         self.history = scene.integrate(self.t_end, self.dt, self.scheme, state, t_eval=kept)
-        if self.history.substeps:
-            raise InputError(f"{self.history.substeps} steps were halved, since they did not "
-                             "converge: derivatives need equal steps, so give a smaller dt")
+        refuse(self.history.substeps, "{} steps were halved, since they did not converge: "
+               "derivatives need equal steps, so give a smaller dt", self.history.substeps)
         seen = self.history.sensors
         self._values = np.concatenate([np.reshape(seen[name], (len(seen.t), -1))
                                        for name in self.readings], axis=1).ravel()
@@ -160,9 +157,8 @@ class MotionDesign(Design):
         if n <= 1:
             return [first, last]
         between = integrator_of(self._built.system, self.scheme).run(first, self.dt, n - 1)
-        if len(between) < n - 1:
-            raise InputError(f"the steps after t = {first.t:.6g} do not converge a second time: "
-                             "give a smaller dt, or every=1")
+        refuse(len(between) < n - 1, "the steps after t = {:.6g} do not converge a second time: "
+               "give a smaller dt, or every=1", first.t)
         return [first, *between, last]
 
     def _steps(self, back: bool = False) -> Iterator[tuple[Motion | None, Motion]]:
@@ -303,9 +299,8 @@ class _Step:
 
     def _same(self, system):
         """A system with other parameters, and its constraints."""
-        if (system.N, system.constraints.m) != (len(self.y.u), len(self.y.multipliers)):
-            raise InputError("the parameters change the number of degrees of freedom or of joint "
-                             "equations")
+        refuse((system.N, system.constraints.m) != (len(self.y.u), len(self.y.multipliers)),
+               "the parameters change the number of degrees of freedom or of joint equations")
         return system, system.constraints
 
     def equations(self, scene: Any) -> Array:
@@ -329,9 +324,8 @@ class _Step:
 
     def require_held(self, change: Array) -> None:
         """Raise InputError if derivatives of supports by parameters are not zero."""
-        if np.any(np.abs(change) > 0.0):
-            raise InputError("a prescribed motion depends on the parameters: derivatives of such "
-                             "motions are not available")
+        refuse(np.any(np.abs(change) > 0.0), "a prescribed motion depends on the parameters: "
+               "derivatives of such motions are not available")
 
     def magnitudes(self) -> Array:
         """Typical magnitudes of the equations."""
@@ -536,9 +530,8 @@ def _by_columns(design, force, u, t, mean):
         values[own] = change[i[own]] / sizes[j[own]]
     found, d = sparse.csr_array((values, (i, j)), shape=2 * (system.N,)), np.cos(np.arange(len(u)))
     missed = np.abs(found @ (sizes * d) - along(d)) * sizes
-    if missed.max() > MISSED * np.max(sizes * (abs(found) @ sizes)):
-        raise InputError("a force couples degrees of freedom that share no element: derivatives of "
-                         "its motions are not available")
+    refuse(missed.max() > MISSED * np.max(sizes * (abs(found) @ sizes)), "a force couples degrees "
+           "of freedom that share no element: derivatives of its motions are not available")
     return found
 
 

@@ -13,7 +13,7 @@ import scipy
 from ..actions.item import Item
 from ..beam.beam import Beam
 from ..core import (Array, Immutable, InputError, NameUnknown, ask_array, is_builtin, rebuilt,
-                    require_option, shown)
+                    refuse, require_option, shown)
 from ..mesh.mapping import PLACES
 from ..mesh.mesh_beam import MeshBeam
 from ..sections.section import Layers, Profile, Rectangle
@@ -113,10 +113,9 @@ class Parameters:
         self.start, self.sizes = (np.concatenate([np.zeros(0), *(
             getattr(one, name).ravel() for one in self.each)]) for name in ("start", "sizes"))
         for one in self.each:
-            if not _has([*scene.beams, *scene.bodies, *scene.items], one.owner):
-                raise InputError(f"{one.owner!r} is no part of the scene: take beams, bodies and "
-                                 "items of scene.beams, scene.bodies, scene.items, and their "
-                                 "attributes")
+            refuse(not _has([*scene.beams, *scene.bodies, *scene.items], one.owner),
+                   "{!r} is no part of the scene: take beams, bodies and items of scene.beams, "
+                   "scene.bodies, scene.items, and their attributes", one.owner)
 
     def _number(self, owner, name):
         """Path of an argument, for a beam as "material.E", its value, and "time" or nothing."""
@@ -128,9 +127,8 @@ class Parameters:
             return tuple(values), np.array(list(values.values())), ""
         path = self._path(owner, name)
         value = reduce(_part, path.split("."), owner)
-        if path == "mesh.height" and owner.mesh.heights is not None:
-            raise InputError(f"the height of {owner!r} varies: use the field (beam, 'height', "
-                             "'nodes')")
+        refuse(path == "mesh.height" and owner.mesh.heights is not None, "the height of {!r} "
+               "varies: use the field (beam, 'height', 'nodes')", owner)
         if not isinstance(owner, Immutable) or value is None:
             raise InputError(f"{shown(owner)} has no argument {name!r} that can be changed alone; "
                              "for anything else use a Design with a function that builds the scene")
@@ -167,9 +165,8 @@ class Parameters:
         else:
             path = self._path(owner, name)
             old = reduce(_part, path.split("."), owner)
-            if old is None:
-                raise InputError(f"{shown(owner)} has no argument {name!r} to which a function "
-                                 "could be added")
+            refuse(old is None, "{!r} has no argument {!r} to which a function could be added",
+                   owner, name)
             old = np.max(np.abs(old(x, 0.0 * x) if callable(old) else old))
             found = basis(x, 0.0 * x)
         found = np.asarray(found, dtype=float)
@@ -194,9 +191,8 @@ class Parameters:
             return out
         value = mesh.height if name == "height" else (
             beam.material.E if name == "E" else beam.width)
-        if not isinstance(value, (int, float)):
-            raise InputError(f"{name} of {beam!r} is no number before it becomes a field: use a "
-                             "Design with a function that builds the scene")
+        refuse(not isinstance(value, (int, float)), "{} of {!r} is no number before it becomes a "
+               "field: use a Design with a function that builds the scene", name, beam)
         return np.full(n if field == "nodes" else mesh.nelements, float(value))
 
     def __call__(self, p: Array) -> Any:

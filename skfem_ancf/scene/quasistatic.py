@@ -13,8 +13,8 @@ import numpy as np
 from ..actions.forces.springs import Turns
 from ..actions.obstacles.obstacle import stiffest
 from ..core import (Array, ArrayLike, ConvergenceError, Immutable, InputError, Interrupted,
-                    ModelWarning, NameUnknown, require_finite, require_flag, require_increasing,
-                    require_integer, require_positive, shown, warn)
+                    ModelWarning, NameUnknown, refuse, require_finite, require_flag,
+                    require_increasing, require_integer, require_positive, warn)
 from ..core.progress import progress_bar
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import COLUMNS, History, state_of
@@ -117,9 +117,8 @@ class Steps(Immutable):
     """
 
     def __init__(self, *unnamed: Any, **durations: float) -> None:
-        if unnamed or not durations:
-            raise InputError("give durations by name, as Steps(press=1.0, release=1.0) or "
-                             f"Steps(**{{'press': 1.0}}), got Steps{shown(unnamed)}")
+        refuse(unnamed or not durations, "give durations by name, as Steps(press=1.0, release=1.0) "
+               "or Steps(**{{'press': 1.0}}), got Steps{!r}", unnamed)
         self.names = tuple(durations)
         with np.errstate(over="ignore"):
             self.ends = require_finite("the sum of the durations", np.cumsum(
@@ -219,8 +218,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         progress: bool | None = None) -> StepHistory:
     """Equilibria over the time of steps, see :meth:`skfem_ancf.Scene.run`. ``sensors`` are names
     and :class:`~skfem_ancf.dynamics.sensors.Sensor`."""
-    if isinstance(steps, dict):
-        raise InputError(f"steps are given by name as Steps(**{shown(steps)}), got a dict")
+    refuse(isinstance(steps, dict), "steps are given by name as Steps(**{!r}), got a dict", steps)
     one = not isinstance(steps, (list, tuple, Steps)) and np.ndim(steps) == 0
     ends = steps.ends if isinstance(steps, Steps) else require_increasing(
         "steps", [steps] if one else steps)

@@ -20,7 +20,7 @@ from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
 from ..beam.masses import projected
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, Interrupted, NameUnknown,
-                    StrPath, ask, ask_field, require_finite, require_finite_scalar,
+                    StrPath, ask, ask_field, refuse, require_finite, require_finite_scalar,
                     require_function, require_label, require_positive, shown)
 from ..dynamics import Scheme, choose_scheme, get_scheme
 from ..dynamics.choice import RTOL
@@ -507,9 +507,8 @@ class Scene(Model):
                 if not isinstance(branch, CriticalPoint) or branch.kind != "bifurcation":
                     raise InputError("branch must be a point of path.critical_points of kind "
                                      f"'bifurcation', got {shown(branch)}")
-                if branch.state.system is not system:
-                    raise InputError("the branch point belongs to another scene, or to this one "
-                                     "before it was changed: follow its path again")
+                refuse(branch.state.system is not system, "the branch point belongs to another "
+                       "scene, or to this one before it was changed: follow its path again")
             try:
                 return Path(system, *continuation(
                     system, steps, ds, ds_max, max_load, until, tol, max_iterations, locate,
@@ -787,8 +786,7 @@ class Scene(Model):
         >>> len(history), history.sensors["tip"].shape, history.sensors.t.shape
         (1, (21, 2), (21,))
         """
-        if require_label("name", name) is None:
-            raise InputError("the name of a sensor must be a text, got None")
+        refuse(require_label("name", name) is None, "the name of a sensor must be a text, got None")
         sensor = Sensor(what, at, beam, recover, line)
         with self._lock:
             locate(sensor, self.system)
@@ -817,10 +815,9 @@ class Scene(Model):
             joint = next((one for one in self.joints if isinstance(item, Joint) and item.driver
                           and one.same(item)), None)
             loads = self._bound(item).bound if joint is None and isinstance(item, Item) else ()
-            if joint is None and not (loads and all(isinstance(one, Load) for one in loads)):
-                raise InputError(
-                    "an input is a Load, as PointForce((0, 1), at=(1, 0)), or a joint of the scene "
-                    f"that prescribes a motion, got {shown(item)}")
+            refuse(joint is None and not (loads and all(isinstance(one, Load) for one in loads)),
+                   "an input is a Load, as PointForce((0, 1), at=(1, 0)), or a joint of the scene "
+                   "that prescribes a motion, got {!r}", item)
             yield name, loads, joint
 
     @property

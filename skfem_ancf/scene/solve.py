@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core import (Array, ConvergenceError, InputError, Interrupted, NameUnknown, SupportError,
-                    require_finite, require_option)
+                    refuse, require_finite, require_option)
 from ..dynamics.choice import choose_scheme
 from ..dynamics.integrator import OF_STEP
 from ..equations.system import System
@@ -30,15 +30,13 @@ _GEOMETRY = {
 
 def displacement(system: System, state: State, name: str = "start") -> Array:
     """Displacement (N,) of a State for a scene; ``name`` is for messages."""
-    if not isinstance(state, State):
-        raise InputError(f"{name} is a State, as solve_static returns it, got "
-                         f"{type(state).__name__}; scene.state(u) makes one of coordinates "
-                         f"of shape ({system.N},)")
+    refuse(not isinstance(state, State), "{} is a State, as solve_static returns it, got {}; "
+           "scene.state(u) makes one of coordinates of shape ({},)", name, type(state).__name__,
+           system.N)
     other = state.system
     if other is not system:
-        if len(other.beams) != len(system.beams):
-            raise InputError(f"{name} is a state of {len(other.beams)} beams, the scene has "
-                             f"{len(system.beams)}")
+        refuse(len(other.beams) != len(system.beams), "{} is a state of {} beams, the scene has {}",
+               name, len(other.beams), len(system.beams))
         for k, (a, b) in enumerate(zip(other.beams, system.beams)):
             if a is b or (a.mesh is b.mesh and a.element is b.element):
                 continue

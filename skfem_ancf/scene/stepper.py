@@ -9,7 +9,7 @@ import numpy as np
 
 from ..actions.forces.springs import Turns
 from ..actions.loads import Amplitude
-from ..core import Array, ArrayLike, ConvergenceError, InputError, require_finite
+from ..core import Array, ArrayLike, ConvergenceError, InputError, refuse, require_finite
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import state_of
 from ..dynamics.run import TimeStepFailed, integrator_of
@@ -168,9 +168,8 @@ class Stepper:
             # a copy: the caller may use the array again
             values.append(given[first:first + one.first.size].reshape(one.first.shape).copy())
             first += one.first.size
-        if given.shape != (first,):
-            raise InputError(f"inputs must have the shape ({first},) of {self.inputs}, got "
-                             f"{given.shape}")
+        refuse(given.shape != (first,), "inputs must have the shape ({},) of {}, got {}", first,
+               self.inputs, given.shape)
         self._set(values)
         y = self._y if self._n else self._start()
         taken = self._integrator.run(y, self.dt, 1, self._begun, self._n)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebinterpolate, chebval
 from numpy.polynomial.legendre import legvander
 
-from ..core import Array, Immutable, InputError, Rule, gauss, lagrange
+from ..core import Array, Immutable, InputError, Rule, gauss, lagrange, refuse
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..mesh.mesh_beam import MeshBeam
@@ -364,9 +364,8 @@ class Across(Immutable):
         layer = self.layers[-side]
         if layer.face is None:
             return self.width(layer, X, tind)
-        if layer.face[side] == 0.0:
-            raise InputError("this section has no width at its bottom and its top: load the axis, "
-                             "by scene.line_load")
+        refuse(layer.face[side] == 0.0, "this section has no width at its bottom and its top: load "
+               "the axis, by scene.line_load")
         return layer.face[side]
 
     def outline(self, X: Array, tind: Array | None = None) -> Any:

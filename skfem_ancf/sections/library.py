@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import InputError, NameUnknown
+from ..core import NameUnknown, refuse
 from ..materials.library import LENGTHS
 
 #: Height, width, thickness of web and flange, root radius.
@@ -133,14 +133,12 @@ def shape_of(name: str) -> Shape:
     if series in ("RHS", "SHS", "CFRHS", "CFSHS") and len(sizes) in (2, 3):
         h, b, t = sizes[0], sizes[-2], sizes[-1]
         times = 1.5 if series[0] != "C" else 2.0 if t <= 6.0 else 2.5 if t <= 10.0 else 3.0
-        if 2.0 * times * t >= min(h, b):
-            raise InputError(f"{name!r} has no hole, or no straight sides: a wall of {t:g} is too "
-                             f"thick for {h:g} x {b:g}")
+        refuse(2.0 * times * t >= min(h, b), "{!r} has no hole, or no straight sides: a wall of "
+               "{:g} is too thick for {:g} x {:g}", name, t, h, b)
         return h, 2.0, *_box(h, b, t, times * t, t if times == 1.5 else (times - 1.0) * t)
     if series in ("CHS", "CFCHS") and len(sizes) == 2:
         h, t = sizes
-        if 2.0 * t >= h:
-            raise InputError(f"{name!r} has no hole: its wall is {t:g}")
+        refuse(2.0 * t >= h, "{!r} has no hole: its wall is {:g}", name, t)
         return h, 2.0, *_box(h, h, t, 0.5 * h, 0.5 * h - t)
     raise NameUnknown("profile", name, [
         "IPE 200", "HEA 200", "HEB 200", "UPN 200", "L 50x50x5", "T 50", "RHS 100x50x4",

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
 
-from ..core import (Array, CallError, Immutable, InputError, Rule, ask_array, gauss, require_flag,
-                    require_option, require_positive, shown)
+from ..core import (Array, CallError, Immutable, InputError, Rule, ask_array, gauss, refuse,
+                    require_flag, require_option, require_positive, shown)
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..materials.library import LENGTHS
@@ -537,9 +537,8 @@ class Layers(Section):
     has_materials = True
 
     def __init__(self, *parts: Any, width: float | Callable[..., Any] | None = None) -> None:
-        if not parts:
-            raise InputError("layers are pairs of a thickness and a material, as Section.layers("
-                             "(0.001, steel), (0.002, brass), width=0.01); got none")
+        refuse(not parts, "layers are pairs of a thickness and a material, as "
+               "Section.layers((0.001, steel), (0.002, brass), width=0.01); got none")
         found = []
         for k, layer in enumerate(parts):
             if not isinstance(layer, (tuple, list)) or len(layer) not in (2, 3) or not isinstance(
@@ -555,12 +554,10 @@ class Layers(Section):
                                                                layer[0]),
                 layer[1],
                 own if callable(own) else require_positive(f"the width of layer {k}", own)))
-        if sum(thickness is None for thickness, _, _ in found) > 1:
-            raise InputError("only one layer can fill the remaining height: give "
-                             "the others a thickness instead of None")
-        if len({material.plane for _, material, _ in found}) > 1:
-            raise InputError("the materials of a section must all be in plane stress, or all in "
-                             "plane strain")
+        refuse(sum(thickness is None for thickness, _, _ in found) > 1, "only one layer can fill "
+               "the remaining height: give the others a thickness instead of None")
+        refuse(len({material.plane for _, material, _ in found}) > 1, "the materials of a section "
+               "must all be in plane stress, or all in plane strain")
         self.parts = tuple(found)
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
@@ -573,10 +570,9 @@ class Layers(Section):
                              f"nothing is left for layer {given.index(None)}, whose thickness is "
                              "None")
         if mesh.heights is not None:
-            if None not in given:
-                raise InputError(f"{self!r} has constant thicknesses and does not fill a tapered "
-                                 "mesh: give one layer the thickness None, to fill the remaining "
-                                 "height, or use a mesh of constant height")
+            refuse(None not in given, "{!r} has constant thicknesses and does not fill a tapered "
+                   "mesh: give one layer the thickness None, to fill the remaining height, or use "
+                   "a mesh of constant height", self)
             return [layer_of(law, width, Moving(partial(_layer, given, k), mesh.height))
                     for k, (_, law, width) in enumerate(self.parts)]
         tops = np.cumsum([mesh.height - total if x is None else x for x in given])
@@ -631,9 +627,8 @@ class Numbers(Section):
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         b, h = self.width, mesh.height
-        if mesh.heights is not None:
-            raise InputError("a section given by numbers is constant along the beam: use a mesh of "
-                             "constant height")
+        refuse(mesh.heights is not None, "a section given by numbers is constant along the beam: "
+               "use a mesh of constant height")
         GA = 5.0 / 12.0 * self.EA if self.GA is None else self.GA
         density = None if self.rhoA is None else self.rhoA / (b * h)
         law = PlaneSections(self.EA / (b * h), GA / (b * h), density)

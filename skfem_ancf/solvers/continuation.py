@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, CallbackError, ConvergenceError, InputError, Interrupted, ask,
+from ..core import (Array, CallbackError, ConvergenceError, Interrupted, ask, refuse,
                     require_function, require_integer, require_positive, shown)
 from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
@@ -139,8 +139,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     locate = None if locate is None else require_positive("locate", locate)
     if until is not None:
         require_function("until", until, "of a point of the path that returns True or False")
-    if require_integer("side", side, -1, 1) == 0:
-        raise InputError("side must be 1 or -1, got 0")
+    refuse(require_integer("side", side, -1, 1) == 0, "side must be 1 or -1, got 0")
     tracer = Tracer(system, require_positive("tol", tol),
                     require_integer("max_iterations", max_iterations, 1, 10000))
     critical: list[CriticalPoint] = []

@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from ..core.band import NO_FACTORS, fix
-from ..core import (Array, ConvergenceError, InputError, ModelWarning, SupportError,
+from ..core import (Array, ConvergenceError, InputError, ModelWarning, SupportError, refuse,
                     require_integer, warn)
 from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
 from ..equations.system import System
@@ -154,9 +154,8 @@ def _dense(tangent, M, k, shift):
         found, quotients = _quotients(tangent, M, (Y @ V / theta)[:, lowest])
         # round-off may reproduce known modes
         new = np.max(np.abs(MX.T @ found), axis=0, initial=0.0) < ORTHOGONAL
-        if not np.any(new):
-            raise InputError(f"only {len(values)} modes of so slender a beam exceed round-off, "
-                             f"k = {k} were requested")
+        refuse(not np.any(new), "only {} modes of so slender a beam exceed round-off, k = {} were "
+               "requested", len(values), k)
         X = np.column_stack([X, found[:, new]])
         values = np.append(values, quotients[new])
     order = np.argsort(values)
@@ -324,11 +323,9 @@ def _prestressed(system):
     springs = abs(system.stiffness_at_rest())
     if push <= UNSTRESSED * (springs.max() if springs.nnz else 0.0) * system.size:
         return None
-    if c.moves or c.drives:
-        raise InputError(
-            "springs or energies push before there is any load, and supports move: buckling() "
-            "starts from the equilibrium without loads, and knows one of them. Use state.stability "
-            "of scene.solve_static(stable=False), or scene.modes(k, state)")
+    refuse(c.moves or c.drives, "springs or energies push before there is any load, and supports "
+           "move: buckling() starts from the equilibrium without loads, and knows one of them. Use "
+           "state.stability of scene.solve_static(stable=False), or scene.modes(k, state)")
     search = Search(system, None, None, Steps("newton", 1e-8, 30, 1.0, 1e-4), True, False)
     try:
         found = search.load_steps("newton", Route(zero, loads=(0.0, 0.0), times=(0.0, 0.0)))
@@ -346,11 +343,10 @@ def _require_same_springs(system, before, u):
     kick *= system.constraints.coordinate_sizes
     rest, here, up, down = (system.forces.firmnesses(system.backend.tables.plain.forces, x)
                             for x in (before, u, u + kick, u - kick))
-    if np.any(np.abs(up - down) > STIFFER * np.maximum(up, down)):
-        raise InputError(
-            "at the buckling load springs or foundations are stiffer to one side than to the "
-            "other, such as ropes and one-sided foundations: buckling() needs one stiffness. Use "
-            "scene.continuation() with a small force to either side, or remove loose elements")
+    refuse(np.any(np.abs(up - down) > STIFFER * np.maximum(up, down)), "at the buckling load "
+           "springs or foundations are stiffer to one side than to the other, such as ropes and "
+           "one-sided foundations: buckling() needs one stiffness. Use scene.continuation() with a "
+           "small force to either side, or remove loose elements")
     if np.any(np.abs(here - rest) > STIFFER * np.maximum(here, rest)):
         warn("springs become stiffer or softer before buckling, but buckling() uses their "
              "stiffness without load: check state.stability of scene.solve_static()", ModelWarning)
@@ -405,11 +401,10 @@ def _require_no_flutter(system, tangent, Ks, factor):
                 values, _ = _unsymmetric(tangent, M, k, shift, small)
             except ConvergenceError:  # a critical point to round-off
                 continue
-            if np.any(values.imag):
-                raise InputError(
-                    f"flutter occurs before buckling at the factor {factor:.6g}, for example at "
-                    f"{part:.3g} times these follower loads: use scene.modes(k, state) about "
-                    "states under load; modes.flutter is True beyond the critical load")
+            refuse(np.any(values.imag), "flutter occurs before buckling at the factor {:.6g}, for "
+                   "example at {:.3g} times these follower loads: use scene.modes(k, state) about "
+                   "states under load; modes.flutter is True beyond the critical load", factor,
+                   part)
     finally:
         tangent.S = S
 
@@ -421,6 +416,5 @@ def _real(X):
 
 
 def _count(k, n):
-    if n == 0:
-        raise InputError("there are no modes: supports and joints fix all degrees of freedom")
+    refuse(n == 0, "there are no modes: supports and joints fix all degrees of freedom")
     return require_integer("the number of modes", k, 1, n)

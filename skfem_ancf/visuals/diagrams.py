@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..beam.layout import WhichBeam, select_beam
-from ..core import Array, InputError, StrPath, require_flag, require_like, require_option
+from ..core import Array, StrPath, refuse, require_flag, require_like, require_option
 from ..recovery.fields import units_of, with_unit
 from ..recovery.grids import grids
 from .matplotlib import dress, new_axes, page
@@ -74,9 +74,8 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
     recover = require_flag("recover", recover)
     require_option("on", on, ("auto", "structure", "length"))
     beams = list(state.beams) if beam is None else [select_beam(state.beams, beam)]
-    if not beams:
-        raise InputError("section forces are those of beams, and this scene has none: see its "
-                         'stress by state.plot("von_mises") and state.extremes("von_mises")')
+    refuse(not beams, 'section forces are those of beams, and this scene has none: see its stress '
+           'by state.plot("von_mises") and state.extremes("von_mises")')
     if on == "auto":
         frame = getattr(state.system.constraints, "frame", None)
         on = "length" if frame is None and len(beams) == 1 else "structure"
@@ -84,8 +83,7 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
         axes = _new_axes(beams, on)
     axes = [axes] if not isinstance(axes, (list, tuple, np.ndarray)) else list(
         np.array(axes, dtype=object).ravel())
-    if len(axes) != 3:
-        raise InputError(f"axes must be three matplotlib Axes, got {len(axes)}")
+    refuse(len(axes) != 3, "axes must be three matplotlib Axes, got {}", len(axes))
     for ax in axes:
         require_like("axes", ax, "matplotlib Axes", "plot", "fill_between")
     (_on_structure if on == "structure" else _over_length)(axes, state, beams, recover)

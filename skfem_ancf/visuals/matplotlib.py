@@ -11,9 +11,9 @@ import numpy as np
 from ..actions.obstacles.contact import touching
 from ..actions.obstacles.outlines import AROUND, around
 from ..beam.layout import WhichBeam
-from ..core import (ArrayLike, InputError, StrPath, require_flag, require_integer, require_like,
-                    require_module, require_option, require_path, require_positive, require_text,
-                    shown)
+from ..core import (ArrayLike, InputError, StrPath, refuse, require_flag, require_integer,
+                    require_like, require_module, require_option, require_path, require_positive,
+                    require_text, shown)
 from ..core.archive import output_file
 from ..recovery.fields import FIELDS, unit_of, units_of
 from ..recovery.grids import layout
@@ -138,9 +138,8 @@ def _draw_contact(ax, scenery, state):
 
     if (found := touching(state)) is None:
         return
-    if scenery.note:
-        raise InputError(f"contact is drawn to scale, and here are {scenery.note}: leave out scale="
-                         " and thickness=")
+    refuse(scenery.note, "contact is drawn to scale, and here are {}: leave out scale= and "
+           "thickness=", scenery.note)
     x, size = found.points, float(np.max(np.ptp(scenery.every[:, :2], axis=0)))
     most = int(np.argmax(found.pressure))
     way = found.force / np.maximum(np.hypot(*found.force), 1e-300)
@@ -295,8 +294,7 @@ def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any,
 
 def _states(state):
     states = state if isinstance(state, (list, tuple)) else [state]
-    if not states:
-        raise InputError("there is no state to draw: got an empty list")
+    refuse(not states, "there is no state to draw: got an empty list")
     for one in states:
         require_like("state", one, "State", "beams", "u_of")
     return states
@@ -374,10 +372,9 @@ def plot_curve(x: ArrayLike, y: ArrayLike, ax: Any = None, *, xlabel: str = "", 
         Of matplotlib's ``Axes.plot``.
     """
     save, x, y = page(ax, title, filename, dpi), np.asarray(x), np.asarray(y)
-    if x.shape != y.shape:
-        raise InputError(f"x and y of a curve are at the same instants, got {x.shape} and "
-                         f"{y.shape} numbers: sensors read all steps, arrays of the history its "
-                         "stored instants")
+    refuse(x.shape != y.shape, "x and y of a curve are at the same instants, got {} and {} "
+           "numbers: sensors read all steps, arrays of the history its stored instants", x.shape,
+           y.shape)
     ax = new_axes((5.5, 4.0)) if ax is None else ax
     ax.plot(x, y, **{"lw": 1.6, **options})
     dress(ax, title, xlabel, ylabel)
@@ -417,8 +414,7 @@ def page(ax: Any, title: str | None, filename: Any, dpi: float, **options: Any,
         require_like("ax", ax, "matplotlib Axes", "tripcolor", "figure")
     require_text("title", title)
     dpi = require_positive("dpi", dpi)
-    if not 1.0 <= dpi <= MAX_DPI:
-        raise InputError(f"dpi must lie between 1 and {MAX_DPI}, got {dpi!r}")
+    refuse(not 1.0 <= dpi <= MAX_DPI, "dpi must lie between 1 and {}, got {!r}", MAX_DPI, dpi)
     if filename is not None:
         known = sorted(FigureCanvasBase.get_supported_filetypes())
         filename = require_path("filename", filename, [f".{kind}" for kind in known])

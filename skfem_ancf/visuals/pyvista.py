@@ -11,7 +11,7 @@ import numpy as np
 
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.outlines import around, outlines
-from ..core import (Array, ArrayLike, ConvergenceError, InputError, StrPath, SupportError,
+from ..core import (Array, ArrayLike, ConvergenceError, InputError, StrPath, SupportError, refuse,
                     require_finite, require_finite_scalar, require_flag, require_index,
                     require_like, require_module, require_path, require_text, shown)
 from ..core.archive import output_file
@@ -54,8 +54,7 @@ class Series:
                  lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> None:
         self._options = fields, subdivide, lagrange, undeformed, recover
         self._history, self.t, self.k = history, history.t, 0
-        if not len(history):
-            raise InputError("the history has no instants")
+        refuse(not len(history), "the history has no instants")
         self.mesh = to_pyvista(history.state(0), *self._options)
 
     def __len__(self) -> int:
@@ -134,8 +133,7 @@ def _blocks_of(mesh, names):
     if not several and not isinstance(mesh, pv.UnstructuredGrid):
         raise InputError(f"out must be a mesh that to_pyvista returned, got {shown(mesh)}")
     blocks, known = (list(mesh), list(mesh.keys())) if several else ([mesh], names[:1])
-    if known != names:
-        raise InputError(f"out must be of the same scene: it has {known}, the state {names}")
+    refuse(known != names, "out must be of the same scene: it has {}, the state {}", known, names)
     return blocks
 
 
@@ -384,8 +382,7 @@ class Explorer:
         import pyvista
 
         size = float(np.hypot(*self.value))
-        if size == 0.0:
-            raise InputError("the force must not be zero: it determines the scale of the arrow")
+        refuse(size == 0.0, "the force must not be zero: it determines the scale of the arrow")
         scale, drawn = ARROW * self._size / size, pyvista.PolyData()
 
         def dragged(tip: ArrayLike, widget: Any) -> None:
@@ -420,9 +417,8 @@ def explorer(solve: Callable[[Any, Any], Any], interval: Any, value: Any, title:
         return made
     low, high = require_finite("interval", interval, (2,))
     value = high if value is None else require_finite_scalar("value", value)
-    if not low <= value <= high or low == high:
-        raise InputError(f"interval must be two numbers that grow, with value between, got "
-                         f"{shown(interval)} and {value:g}")
+    refuse(not low <= value <= high or low == high, "interval must be two numbers that grow, with "
+           "value between, got {!r} and {:g}", interval, value)
     made = Explorer(solve, [low, high, value], **picture)
     made.slider(low, high, title)
     return made

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..actions.obstacles.contact import may_touch
 from ..actions.obstacles.outlines import AROUND, around, outlines
-from ..core import (AncfError, Array, InputError, require_finite_scalar, require_flag,
+from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar, require_flag,
                     require_positive, require_unmasked, shown)
 from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_of, units_of,
                                values_on_grid, with_unit)
@@ -144,8 +144,7 @@ def _limits(limits, values, field):
         except (TypeError, ValueError):
             raise InputError(f"limits must be two numbers, got {shown(limits)}") from None
         low, high = require_finite_scalar("limits", low), require_finite_scalar("limits", high)
-        if not low < high:
-            raise InputError(f"limits must increase, got {shown(limits)}")
+        refuse(not low < high, "limits must increase, got {!r}", limits)
         return low, high
     start = field.neutral
     size = np.max(np.abs(values[np.isfinite(values)] - start), initial=0.0) or 1.0

@@ -12,7 +12,7 @@ from ..actions.loads import LineLoad, Load, TimedLoad
 from ..actions.places import Vector
 from ..actions.symbols import LOADS, Symbol
 from ..beam.layout import Layout
-from ..core import Array, InputError
+from ..core import Array, refuse
 from .scenery import INK, MUTED, rounded, unit_of_resultant
 
 #: Colours of loads and of supports.
@@ -30,9 +30,8 @@ def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> 
     if not (loads or supports):
         return []
     system: Any = getattr(state, "system", None)
-    if getattr(system, "items", None) is None:
-        raise InputError("this state does not know the items of its scene, as it comes from another"
-                         " process or a file: draw them by scene.plot()")
+    refuse(getattr(system, "items", None) is None, "this state does not know the items of its "
+           "scene, as it comes from another process or a file: draw them by scene.plot()")
     layout, found, t = Layout(*system.members), list[Symbol](), state.t
     for item in chain.from_iterable(one.expand(layout) for one in system.items):
         factor = 1.0

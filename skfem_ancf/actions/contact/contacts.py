@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.band import Band
 from ...core.callbacks import handle_of
-from ...core import Array, InputError, shown
+from ...core import Array, InputError, refuse, shown
 from .active_set import BEYOND, project
 from .crossing import CrossingGuard, middle_of
 from .gap import TINY, places
@@ -354,17 +354,14 @@ class Contacts:
         reason = BY_POINTS if kick == np.inf else (
             f"a body that is stopped in a step would rebound up to {kick - 1.0:.2g} times as fast")
         for one in self.obstacles:
-            if one.method == "augmented" and kick > 2.0 + 1e-9:
-                raise InputError(
-                    f"{scheme!r} does not take method='augmented' of {one!r}: {reason}. Use "
-                    "'energy-momentum', which conserves energy, GeneralizedAlpha(0), or "
-                    "method='penalty'")
+            refuse(one.method == "augmented" and kick > 2.0 + 1e-9, "{!r} does not take "
+                   "method='augmented' of {!r}: {}. Use 'energy-momentum', which conserves energy, "
+                   "GeneralizedAlpha(0), or method='penalty'", scheme, one, reason)
 
     def require_free(self, u: Array, what: str, instead: str) -> None:
         """Raise InputError if a linear solution penetrates an obstacle."""
-        if any(gap.min() < 0.0 for _, _, gap in self.look(u, 1.0)):
-            raise InputError(f"{what} knows no contact, and its solution enters an obstacle: use "
-                             f"{instead}")
+        refuse(any(gap.min() < 0.0 for _, _, gap in self.look(u, 1.0)), "{} knows no contact, and "
+               "its solution enters an obstacle: use {}", what, instead)
 
     # values
 

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from typing import Any, NamedTuple
 
 from ...beam.layout import Layout
-from ...core import InputError, explained, is_builtin, shown
+from ...core import InputError, explained, is_builtin, refuse
 from ..bound import BoundForce, try_force, user_parts
 from ..item import Item
 from ..places import Vector
@@ -141,12 +141,10 @@ class ForceElement(BoundForce, Item):
         with nullcontext() if known else explained(
                 "{!r} fails in the reference configuration", hint, InputError, self):
             bound.links = links = bound.bind(layout)
-            if not known and (not isinstance(links, (list, tuple)) or not links or not all(
-                    isinstance(x, Vector) for x in links)):
-                raise InputError(
-                    f"bind(scene) of {self!r} must return a list of points and sections, as "
-                    "[point(scene, None, (1, 0))] with skfem_ancf.actions.forces.point, got "
-                    f"{shown(links)}")
+            refuse(not known and (not isinstance(links, (list, tuple)) or not links or not all(
+                        isinstance(x, Vector) for x in links)), "bind(scene) of {!r} must return a "
+                   "list of points and sections, as [point(scene, None, (1, 0))] with "
+                   "skfem_ancf.actions.forces.point, got {!r}", self, links)
             if bound.parts() is None and bound.entries is None:  # also for a user's law of a spring
                 try_force(bound)
             bound._freeze()

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from ...beam.beam import Beam
 from ...beam.layout import Layout, WhichBeam, WhichMember
-from ...core import (Array, ArrayLike, InputError, require_finite, require_finite_scalar,
+from ...core import (Array, ArrayLike, refuse, require_finite, require_finite_scalar,
                      require_not_negative, shown)
 from ..item import Item
 from ..places import Vector, point, section
@@ -40,9 +40,8 @@ class PointMass(ForceElement):
         self.inertia = require_not_negative("inertia", inertia)
         self.at = at if isinstance(at, str) else tuple(require_finite("at", at, (2,)).tolist())
         self.beam = beam
-        if not self.mass and not self.inertia:
-            raise InputError("a point mass needs a mass or an inertia that is positive, got two "
-                             "zeros")
+        refuse(not self.mass and not self.inertia, "a point mass needs a mass or an inertia that "
+               "is positive, got two zeros")
 
     def bind(self, layout: Layout) -> list[Vector]:
         self._masses = [(self.mass, point(layout, self.beam, self.at))]

@@ -14,7 +14,7 @@ from ...beam.kernels.section import beam_gradients
 from ...beam.kinematics import probe_reference
 from ...beam.layout import Layout, WhichBeam, select_beam
 from ...beam.rigid import RigidBody, on_body
-from ...core import (Array, InputError, Place, ask_number, gauss, require_finite_scalar,
+from ...core import (Array, InputError, Place, ask_number, gauss, refuse, require_finite_scalar,
                      require_flag, require_function, require_integer, require_not_negative, shown)
 from ...mesh.places import points_of_rows
 from ..item import Item
@@ -242,23 +242,20 @@ class Spring(ElasticElement):
         self.damping = number_or_law("damping", damping, "rate")
         self.length = None if length is None else require_not_negative("length", length, False)
         between = points_of_rows(between)
-        if not isinstance(between, (tuple, list)) or len(between) != 2:
-            raise InputError("between must be two places, as ((1, 0), (1, 0.5)), got "
-                             f"{shown(between)}")
+        refuse(not isinstance(between, (tuple, list)) or len(between) != 2, "between must be two "
+               "places, as ((1, 0), (1, 0.5)), got {!r}", between)
         self.between = tuple((place, None) if isinstance(place, RigidBody) else place
                              for place in between)
 
     def bind(self, layout: Layout) -> list[Vector]:
         a, b = (end_of(layout, place) for place in self.between)
-        if not a.weights.size and not b.weights.size:
-            raise InputError(f"neither end of the spring between {shown(self.between)} is a point "
-                             "of a beam or a rigid body: both would be of the ground")
+        refuse(not a.weights.size and not b.weights.size, "neither end of the spring between {!r} "
+               "is a point of a beam or a rigid body: both would be of the ground", self.between)
         self._link = b - a
         distance = float(np.hypot(*self._link.start))
-        if distance == 0.0 and self.length != 0.0:
-            raise InputError(f"the spring between {shown(self.between)} has length zero, and so no "
-                             "direction: name two different points, or give length=0 for a spring "
-                             "that pulls them together")
+        refuse(distance == 0.0 and self.length != 0.0, "the spring between {!r} has length zero, "
+               "and so no direction: name two different points, or give length=0 for a spring that "
+               "pulls them together", self.between)
         self._length = self._scale = distance if self.length is None else self.length
         return [self._link]
 
@@ -322,10 +319,9 @@ class TorsionalSpring(ElasticElement):
         self.at, self.beam = on_body(at, beam)
         self.other = None if other is None else both_of("other", other)
         self.angle = require_finite_scalar("angle", angle)
-        if abs(self.angle) > np.pi:
-            raise InputError(f"angle must lie in [-pi, pi], got {self.angle!r}: the angle of a "
-                             "section is known up to whole turns only. Of a spring wound by "
-                             "more, add the moment of the turns, 2 pi k each, by scene.moment")
+        refuse(abs(self.angle) > np.pi, "angle must lie in [-pi, pi], got {!r}: the angle of a "
+               "section is known up to whole turns only. Of a spring wound by more, add the moment "
+               "of the turns, 2 pi k each, by scene.moment", self.angle)
 
     #: The angle at the end of the last step.
     _last = 0.0
@@ -384,8 +380,7 @@ def spring_of(elements: Sequence[ForceElement], which: Any) -> Any:
     for one in springs:
         if one is which:
             return one
-    if not springs:
-        raise InputError("the scene has no springs")
+    refuse(not springs, "the scene has no springs")
     if isinstance(which, ElasticElement):
         raise InputError(f"{which!r} is not one of scene.elements: name it by its number among the "
                          f"{len(springs)} springs of the scene, in the order they were added")

@@ -10,8 +10,9 @@ import numpy as np
 
 from ...beam import Beam, RigidBody
 from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
-from ...core import (Array, ArrayLike, InputError, array_cache, hermite_basis, require_direction,
-                     require_finite, require_flag, require_label, require_positive, shown)
+from ...core import (Array, ArrayLike, InputError, array_cache, hermite_basis, refuse,
+                     require_direction, require_finite, require_flag, require_label,
+                     require_positive, shown)
 from ...mesh.mapping import cross, turned
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol, tangent_at
@@ -76,9 +77,8 @@ class OnCircle(ComposedJoint):
         d = point(layout, self.beam, self.at) - Vector(self.center)
         distance = np.hypot(*d.start)
         R = self.radius or require_positive("the distance of the point from the centre", distance)
-        if R < 1e-9 * distance:
-            raise InputError(f"radius = {R!r} is negligible against the distance of the point "
-                             "from the centre")
+        refuse(R < 1e-9 * distance, "radius = {!r} is negligible against the distance of the point "
+               "from the centre", R)
         self.parts = [distant(d, R)]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
@@ -508,8 +508,7 @@ class Slot(ComposedJoint):
         b, e = section(layout, self.on, tuple(map(
             float, p.start if self.through is None else self.through)))
         self.constant, w = not e.dofs.size, p - b
-        if not w.dofs.size:
-            raise InputError(f"{self!r}: the point and the line are both of the ground")
+        refuse(not w.dofs.size, "{!r}: the point and the line are both of the ground", self)
         if which == self.on or (which != GROUND and self.on != GROUND
                                 and layout.beam(which) is layout.beam(self.on)):
             raise InputError(f"{self!r}: a point cannot slide along a line of its beam or body")
@@ -535,6 +534,5 @@ def slider(layout: Layout, at: Any, on: WhichMember, direction: ArrayLike | None
         if direction is None:
             raise InputError(f"a slider on {shown(on)} needs the direction of its line")
         return Slot(at, on, direction, angle=angle, name=name)
-    if direction is not None:
-        raise InputError("a slider on a beam moves along its axis: give no direction")
+    refuse(direction is not None, "a slider on a beam moves along its axis: give no direction")
     return Sleeve(at, on, angle, name)  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, InputError, require_index
+from ...core import Array, InputError, refuse, require_index
 from ..contact.contacts import SEEN
 from ..item import Item
 
@@ -86,8 +86,7 @@ def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
     member = None if on is None else _number(state.system.members, on)
     if isinstance(which, Item):
         known = [e for e in forces.elements if e.same(which) and (e.groups or hasattr(e, "look"))]
-        if not known:
-            raise InputError(f"{which!r} is no obstacle and no contact of this scene")
+        refuse(not known, "{!r} is no obstacle and no contact of this scene", which)
     elif which is not None:
         known = [forces.contacts.obstacles[require_index("obstacle", which,
                                                          len(forces.contacts.obstacles))]]

@@ -8,9 +8,8 @@ import numpy as np
 
 from ...beam.kernels.section import beam_gradients
 from ...beam.layout import Layout, WhichBeam, select_beam
-from ...core import (Array, InputError, ModelWarning, ask_array, gauss_lobatto, require_function,
-                     require_integer, require_not_negative, require_option, require_positive, shown,
-                     warn)
+from ...core import (Array, ModelWarning, ask_array, gauss_lobatto, refuse, require_function,
+                     require_integer, require_not_negative, require_option, require_positive, warn)
 from ..contact.contacts import FIRMER, Group
 from ..contact.poses import carried, taken_back
 from ..forces.base import ForceElement, KernelElement
@@ -99,9 +98,8 @@ class Obstacle(ForceElement):
                  beam: WhichBeam = None, method: str = "penalty", position: Any = None,
                  angle: Any = None, damping: float = 0.0, points: int | None = None,
                  width: float | None = None, tolerance: float | None = None) -> None:
-        if not isinstance(shape, Shape):
-            raise InputError("an obstacle is a Circle, Line, Polygon or SignedDistance of "
-                             f"skfem_ancf.actions.obstacles, got {shown(shape)}")
+        refuse(not isinstance(shape, Shape), "an obstacle is a Circle, Line, Polygon or "
+               "SignedDistance of skfem_ancf.actions.obstacles, got {!r}", shape)
         self.shape, self.beam = shape, beam
         self.friction = require_not_negative("friction", friction, False)
         self.damping = require_not_negative("damping", damping)
@@ -163,9 +161,8 @@ class Obstacle(ForceElement):
         return carried(pose, points), pieces
 
     def bind(self, layout: Layout) -> list[Vector]:
-        if not layout.beams:
-            raise InputError("an obstacle is touched by surfaces of beams, and the scene has "
-                             "none: use one-sided springs, or add a beam")
+        refuse(not layout.beams, "an obstacle is touched by surfaces of beams, and the scene has "
+               "none: use one-sided springs, or add a beam")
         beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
         height = min(beam.mesh.height for beam in beams)
         self.tolerance = self.tolerance or TOLERANCE * height

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core import (Array, ArrayLike, CallbackError, Immutable, InputError, ask, require_direction,
-                     require_finite, require_flag, require_function, require_not_negative,
-                     require_positive, shown, warnings_as_errors)
+from ...core import (Array, ArrayLike, CallbackError, Immutable, InputError, ask, refuse,
+                     require_direction, require_finite, require_flag, require_function,
+                     require_not_negative, require_positive, shown, warnings_as_errors)
 from ..contact.gap import outline
 from ..contact.tables import CUSTOM, OUTLINE
 from ..item import takes_time
@@ -208,9 +208,8 @@ class Polygon(Outline):
             corners = np.array(points, dtype=float)
         except (TypeError, ValueError):
             corners = np.zeros(0)
-        if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
-            raise InputError("points must be three corners or more, each (x, y), as "
-                             f"[(0, 0), (1, 0), (0, 1)], got {shown(points)}")
+        refuse(corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3, "points must be "
+               "three corners or more, each (x, y), as [(0, 0), (1, 0), (0, 1)], got {!r}", points)
         corners = require_finite("points", corners)
         self.bend = self.radius = require_not_negative("radius", radius, False)
         self.hollow = require_flag("hollow", hollow)

@@ -9,7 +9,7 @@ from scipy import sparse
 
 from ...beam.beam import Beam
 from ...beam.layout import Layout
-from ...core import (Array, InputError, require_flag, require_label, require_not_negative,
+from ...core import (Array, InputError, refuse, require_flag, require_label, require_not_negative,
                      require_positive, shown)
 from ..contact.contacts import SEEN
 from ..contact.laws import mean_pressure, mean_pressure_slope, return_mapping
@@ -165,10 +165,8 @@ class BodyContact(ForceElement):
         allowed |= allowed.T
         for k in range(n):
             allowed[k, k] = self.self_contact and k in a and isinstance(layout.members[k], Beam)
-        if not allowed.any():
-            raise InputError(f"{self!r} has nothing to touch: give self_contact=True for the "
-                             "contact of a beam with itself, or two members, as "
-                             "scene.contact(0, 1)")
+        refuse(not allowed.any(), "{!r} has nothing to touch: give self_contact=True for the "
+               "contact of a beam with itself, or two members, as scene.contact(0, 1)", self)
         return np.flatnonzero(allowed.any(axis=0)).tolist(), allowed
 
     def _begin(self, layout):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...beam import Beam, RigidBody
 from ...beam.kernels.section import beam_gradients
-from ...core import Array, InputError, gauss_lobatto
+from ...core import Array, gauss_lobatto, refuse
 from ..obstacles.obstacle import face_width, lobatto, stiffest
 
 #: Points across the end of a beam.
@@ -102,9 +102,8 @@ def _facets(dofs, weights, x, zeta, rule, widths, **values):
 def _of_beam(beam):
     """Bottom and top, and both ends of each chain."""
     mesh, element, mapping = beam.mesh, beam.element, beam.mesh.mapping()
-    if not beam.has_sections and mesh.heights is not None:
-        raise InputError(f"contact knows cables of constant height only, not {beam!r}: take an "
-                         "element with sections, as ElementBeamANCF(2)")
+    refuse(not beam.has_sections and mesh.heights is not None, "contact knows cables of constant "
+           "height only, not {!r}: take an element with sections, as ElementBeamANCF(2)", beam)
     E = stiffest(beam.across, np.arange(mesh.nelements))[0]
     common = {"heights": mesh.height, "firmness": E / mesh.height}
     dofs = mesh.t[0][:, None] * (beam.nd // 2) + np.arange(beam.nd)

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...core import Array, InputError, first_order, gauss
+from ...core import Array, first_order, gauss, refuse
 from ...formulations import Formulation
 from ...materials.history import HistoryMaterial
 from ...sections import Across
@@ -128,10 +128,9 @@ class CableKernel(ElementKernel):
     def _with_fibres(self, mesh, element, same):
         """A table of fibres for each layer."""
         across = self._across
-        if any(callable(layer.grade) for layer in across.layers):
-            raise InputError("a cable with a law that has a history needs a constant E in its "
-                             "other layers: give more layers in place of E(x, y), or use an "
-                             "element with sections")
+        refuse(any(callable(layer.grade) for layer in across.layers), "a cable with a law that has "
+               "a history needs a constant E in its other layers: give more layers in place of "
+               "E(x, y), or use an element with sections")
         same = same and across.constant
         whole, n = self._table(mesh, element, same), self.points_number
         L, tind = mesh.lengths[:, None], None
