@@ -1,5 +1,7 @@
 """The shear-rigid cable: its kernel, exact rods, motion and fields."""
 
+import re
+
 import exact
 import numpy as np
 import pytest
@@ -8,6 +10,9 @@ from scipy.optimize import fsolve
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, ModelWarning,
                         Scene, Section, StVenantKirchhoff)
 from skfem_ancf.actions.loads import Traction
+from skfem_ancf.beam.kinematics import bent, shortest
+from skfem_ancf.beam.strain_energy import stress_size
+from skfem_ancf.equations.evaluation import AXES, RANGE, UNSEEN, examine
 
 DEGREES = (3, 5, 7, 9, 13)
 E, NU, RHO, B = 2e8, 0.3, 7800.0, 0.01
@@ -320,3 +325,38 @@ def test_a_clamp_with_a_free_thickness_at_any_angle(element, angle):
     found, x = state.reactions("left"), along + state.displacement(tuple(along))
     np.testing.assert_allclose(found.force, -P, atol=1e-8)
     assert found.moment == pytest.approx(-(x[0] * P[1] - x[1] * P[0]), rel=1e-8)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamCable(5), ElementBeamANCF(2)],
+                         ids=repr)
+@pytest.mark.parametrize("curved", [False, True])
+def test_what_an_iteration_has_seen_is_within_the_range(element, curved):
+    """By the numbers that warnings ask: turn and folds of an axis, stretch of outer fibres."""
+    line = np.linspace(0, 1, 7)
+    mesh = MeshBeam.init_line(line, 0.05) if not curved else MeshBeam.init_curve(
+        lambda s: np.array([np.sin(s), 1 - np.cos(s)]), line, 0.05)
+    beam = Beam(mesh, element, StVenantKirchhoff(1e6, 0.3), width=0.1)
+    plain, found = Scene(beam, beam.replace(name="other")).system.backend.tables.plain, set()
+    rng, n = np.random.default_rng(3), beam.N
+    for size in np.repeat([1e-4, 1e-3, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0], 30):
+        u = np.zeros(2 * n)
+        u[n:] = size * rng.standard_normal(n) * beam.sizes
+        seen = examine(plain, u, np.zeros(stress_size(plain.body)))
+        turn, folded = bent(beam, u[n:])
+        assert (seen >= AXES) == (turn <= 1.0 and not folded)
+        if seen == RANGE:
+            assert shortest(beam, u[n:]) > 0.0
+        found.add(seen)
+    certain = not (beam.has_sections or curved)
+    assert found == ({UNSEEN, AXES, RANGE} if certain else {UNSEEN, AXES})
+
+
+@pytest.mark.parametrize("n, turn, text", [(40, 12.0, "overlap"), (8, 9.0, "too coarse.*turns by 1.1"),
+                                           (8, 7.0, "")])
+def test_bending_beyond_the_range_is_told(n, turn, text, recwarn):
+    """Sections of height 0.2 overlap from the curvature 10 on, and 1 rad an element is too far."""
+    rod = Beam(line(n, 0.2), ElementBeamCable(3), StVenantKirchhoff(E, NU), width=B)
+    state = Scene(rod).clamp("left").moment("right", turn * E * B * 0.2**3 / 12.0).solve_static()
+    assert state.checks.turning == pytest.approx(turn / n, rel=3e-3)
+    found = [str(w.message) for w in recwarn if issubclass(w.category, ModelWarning)]
+    assert len(found) == bool(text) and all(re.search(text, one) for one in found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from copy import copy
 from functools import partial
 from threading import RLock
@@ -159,15 +159,13 @@ class Backend:
         are those of the work that is done with it. With ``calls`` it calls Python. NumPy may warn
         of overflow."""
         global _worked
-        if self.choose(kernel.__name__, iterations).way == "plain":
+        way, name = self.choose(kernel.__name__, iterations).way, kernel.__name__
+        if way == "plain":
             _worked += self.seconds(iterations)
             return self._in_numpy(kernel)
-        return self._compiled(kernel, calls or self.tables.calls_back)
-
-    def _in_numpy(self, kernel):
-        return partial(kernel, self.tables.plain)
-
-    def _compiled(self, kernel, calls):
+        calls = calls or self.tables.calls_back
+        if way == "loaded":
+            return self._bound(name, calls)
         loaded: list[Any] = []
 
         def run(*args):
@@ -176,6 +174,23 @@ class Backend:
             return loaded[0](*args)
 
         return run
+
+    def _in_numpy(self, kernel):
+        return partial(kernel, self.tables.plain)
+
+    def _bound(self, name, calls):
+        """A loaded kernel bound to the equations; if it calls Python, with exceptions of that."""
+        function = partial(LOADED[name], self._flatten()[1].address)
+        if not calls:
+            return function
+
+        def checked(*args):
+            with deferred():
+                found = function(*args)
+            raise_kept()
+            return found
+
+        return checked
 
     def _loaded(self, kernel, args, calls):
         """A kernel as the first call needs it: compiled, or in NumPy if that is impossible. It
@@ -199,7 +214,7 @@ class Backend:
                         LOADED[name] = entry(kernel, (equations, *args))
                         code_cache.note(name)
                         update(name)
-            function = partial(LOADED[name], self._flatten()[1].address)
+            return self._bound(name, calls)
         except code_cache.NotCompiled as error:  # a user's function
             self._plain = (self._base or self)._plain = str(error)
             logger.info(self._plain)
@@ -210,14 +225,6 @@ class Backend:
                 f"{name} cannot be compiled: {error!r}")
             logger.warning("%s; it runs in NumPy", PROBLEMS[-1])
             return self._in_numpy(kernel)
-
-        def checked(*args):
-            with deferred() if calls else nullcontext():
-                found = function(*args)
-            raise_kept()
-            return found
-
-        return checked
 
     def keep_factors(self) -> None:
         """Let the tangent have the factors of the last compiled iteration."""

@@ -9,7 +9,7 @@ from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_ta
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
-                                  body_tangent)
+                                  body_stress, body_tangent)
 from ..core.band import add_to_diagonal, diagonal, dot, largest, weighted_square
 from ..core import F1, F2, MADE, apart, indices, source
 from .tables import Equations
@@ -118,6 +118,38 @@ def balance(e, target, factors, which, mixed, g, x, m, stresses, norms):
         R[i] *= e.free[i]
     size = np.sqrt(max(weighted_square(f, weights), weighted_square(load, weights)))
     norms[0], norms[1], norms[2] = np.sqrt(weighted_square(R, weights)), size, opened
+
+
+#: What an iteration has seen to be within the range of the model: nothing, the axes of all beams
+#: (none turns by more than a radian over an element, or folds), or their strains too.
+UNSEEN, AXES, RANGE = range(3)
+#: Tangent of that angle.
+RADIAN = 1.557
+
+
+@source
+def examine(e, u, stresses):
+    """UNSEEN, AXES or RANGE, whichever is sure at u; ``stresses`` are overwritten."""
+    nodes, rest, n = e.axes.nodes, e.axes.rest, e.axes.nodes.shape[1]
+    beyond = np.empty(n)
+    for k in indices(n):
+        i, j = nodes[0, k], nodes[1, k]
+        a, b = rest[0, k] + u[i + 2], rest[1, k] + u[i + 3]
+        c, d = rest[2, k] + u[j + 2], rest[3, k] + u[j + 3]
+        x, y = rest[4, k] + (u[j] - u[i]), rest[5, k] + (u[j + 1] - u[i + 1])
+        p, q = a * c + b * d, a * d - b * c
+        turn = np.abs(q * rest[6, k] + p * rest[7, k]) - RADIAN * (
+            p * rest[6, k] - q * rest[7, k])
+        beyond[k] = np.maximum(0.0, np.maximum(turn, -np.minimum(a * x + b * y, c * x + d * y)))
+    if largest(beyond) != 0.0:
+        return UNSEEN
+    limits = e.axes.limits
+    if limits.size < stresses.size:
+        return AXES
+    body_stress(e.body, u, stresses)
+    for k in indices(limits.size):
+        stresses[k] *= limits[k]
+    return RANGE if largest(stresses) < 1.0 else AXES
 
 
 @source

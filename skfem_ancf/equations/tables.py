@@ -8,14 +8,15 @@ from weakref import proxy, ref
 import numpy as np
 
 from ..core.band import Band, dense
-from ..core import F1, I1, Array, cached_property
+from ..core import F1, F2, I1, I2, Array, cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.histories import remembering
 from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
-from ..beam.kernels.tables import CABLE, linearised
+from ..beam import kinematics
+from ..beam.kernels.tables import CABLE, OF_H, linearised
 from ..core.callbacks import handle_of
 from ..core.words import constant
 from ..actions.loads import Load
@@ -23,6 +24,7 @@ from ..actions.tables import JointTables, LoadTables
 
 #: Empty tables.
 _NO_INTS = np.zeros(0, np.int64)
+_NO_NODES = np.zeros((2, 0), np.int64)
 _NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
                                   np.zeros(0), 0))
 _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
@@ -30,6 +32,15 @@ _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)
 _NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64)))
 _NO_EIGENSTRAINS = np.zeros((0, 0))
 _NO_FACTORS = Band(np.zeros(0), _NO_INTS, 1, 0, 0)
+
+
+class Axes(NamedTuple):
+    """What shows that beams are within the range of the model, see
+    :func:`~skfem_ancf.equations.evaluation.examine`."""
+
+    nodes: I2  # first DOFs of the left and right nodes of all elements, (2, n)
+    rest: F2  # in the reference: r_X at both nodes, chord, turn back, (8, n)
+    limits: F1  # of cables: a factor of each stress, at most 1 within the range; or empty
 
 
 class Equations(NamedTuple):
@@ -49,6 +60,7 @@ class Equations(NamedTuple):
     span: F1  # Histories.span
     lasting: int  # 1 if steps change the history, 3 if materials have one
     factors: Band  # work of compiled code: factors of K
+    axes: Axes
 
 
 class UserDefined:
@@ -141,7 +153,7 @@ class Tables:
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes,
                                histories.values, histories.span, histories.lasting,
-                               _NO_FACTORS)
+                               _NO_FACTORS, self._axes(body))
 
     @property
     def system(self) -> Any:
@@ -209,6 +221,26 @@ class Tables:
             copies=body, loads=loads, forces=forces, history=histories.values,
             span=histories.span)
         return tables
+
+    def _axes(self, body):
+        """The Axes. Stresses are strains times moduli in linear laws without coupling; of cables
+        half the length, or half the curvature of a radius of half the height, are far from
+        sections that overlap."""
+        beams, nodes, rest, limits = self.system.beams, [_NO_NODES], [np.zeros((8, 0))], []
+        for beam, s in zip(beams, self.system.slices):
+            (left, right), slopes = kinematics.ends(beam, beam.q0_local)
+            parts = np.array([*slopes, right - left, beam._turned_back])
+            rest.append(parts.view(float).reshape(4, -1, 2).transpose(0, 2, 1).reshape(8, -1))
+            nodes.append(s.start + beam.nd * beam.mesh.t)
+        high = max((beam.mesh.height for beam in beams), default=0.0)
+        if all(t.kind == CABLE and t.law.kind == LINEAR and t.rows.shape[1] == len(t.H[0])
+               for t in body.packs) and all(beam.mesh.is_straight for beam in beams):
+            for t in body.packs:
+                size = np.repeat([2.0, high], t.rows.shape[1] // 2) / t.H
+                limits.append((size[t.at[:, OF_H]] if len(size) > 1 else np.tile(
+                    size, (len(t.start), 1))).ravel())
+        return Axes(np.concatenate(nodes, axis=1), np.concatenate(rest, axis=1),
+                    np.concatenate([np.zeros(0), *limits]))
 
     def _forces(self):
         s = self.system

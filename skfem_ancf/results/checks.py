@@ -16,6 +16,7 @@ from ..beam.beam import Beam
 from ..beam.distribution import SNAP
 from ..beam.kinematics import tangents
 from ..core import Array, ModelWarning, StabilityWarning, warn
+from ..equations.evaluation import RANGE
 from ..equations.stability import response
 from ..materials.base import LinearLaw
 from ..recovery.grids import values_of_domain
@@ -176,12 +177,13 @@ def warn_of(state: Any) -> None:
     for text in _kinks(state):
         warn(text, ModelWarning)
     warn_of_points(state.system)
-    turns = state._turns or [None] * len(state.beams)
-    for beam, s, turn in zip(state.system.beams, state.system.slices, turns):
+    if state._seen == RANGE:
+        return
+    for beam, s in zip(state.system.beams, state.system.slices):
         u = state.u[s]
         shortest = 1.0 if beam.has_sections and not beam.kernel.linear else (
             kinematics.shortest(beam, u))
-        for text in _findings(beam, shortest, turning(beam, u) if turn is None else turn):
+        for text in _findings(beam, shortest, 0.0 if state._seen else turning(beam, u)):
             warn(f"{text} (state.checks has the numbers)", ModelWarning)
 
 

@@ -23,6 +23,7 @@ from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
 from ..core import (Array, Immutable, InputError, NameUnknown, NearMisses, Place, cached_property,
                     first_order, refuse, require_flag, require_integer, step)
+from ..equations.evaluation import UNSEEN
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
 from ..equations.system import System
@@ -250,8 +251,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the run stored.
     verdict
         What the solver knows of its stability, or None: it is found when asked for.
-    turns
-        Largest rotation of the axis of each beam over an element, if known.
+    seen
+        What the solver has seen to be within the range of the model, see
+        :func:`skfem_ancf.equations.evaluation.examine`.
 
     Attributes
     ----------
@@ -310,7 +312,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     _motion: Any
     _origin: Any
     _verdict: Verdict | None
-    _turns: list[float] | None
+    _seen: int
 
     def __init__(self, system: System, u: Array, load: float = 1.0, force: Array | None = None,
                  converged: bool = True, iterations: int = 0, message: str = "",
@@ -319,7 +321,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
                  acceleration: Array | None = None, motion: Any = None, origin: Any = None,
                  verdict: Verdict | None = None, doubt: str = "",
                  memory: Array | None = None, base: State | None = None,
-                 turns: list[float] | None = None) -> None:
+                 seen: int = UNSEEN) -> None:
         m = system.constraints.m
         multipliers = np.zeros(m) if multipliers is None else multipliers
         for name, value, size in (("u", u, system.N), ("multipliers", multipliers, m)):
@@ -330,7 +332,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
             system=system, u=u, load=load, multipliers=multipliers, converged=converged,
             iterations=iterations, message=message, steps=tuple(steps), t=t,
             acceleration=acceleration, doubt=doubt, memory=memory, base=base, _force=force,
-            _inertia=inertia, _verdict=verdict, _motion=motion, _origin=origin, _turns=turns)
+            _inertia=inertia, _verdict=verdict, _motion=motion, _origin=origin, _seen=seen)
 
     def replace(self, **changes: Any) -> State:
         """A copy with changed attributes, as ``replace(message="guess")``.
@@ -352,7 +354,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         for name, value in changes.items():
             setattr(other, name, value)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
-            other._verdict = other._force = other._turns = None
+            other._verdict, other._force, other._seen = None, None, UNSEEN
         if {"u", "multipliers", "system"} & set(changes):
             other._motion = other._origin = other.memory = None
         other._freeze()

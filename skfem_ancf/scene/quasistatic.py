@@ -363,8 +363,7 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             else:
                 step = Increment(system, start, 1.0, Options(
                     route, method, rules.tol, rules.max_iterations, method == "mixed", True))
-                with np.errstate(all="ignore"):  # overflow shows in the residual
-                    result = step.reached(step.solve(stable))
+                result = step.reached(step.solve(stable))
         except LoadStepFailed as failure:
             failed = failure
             continue
@@ -400,8 +399,7 @@ def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticRe
     for k, one in enumerate(tries):
         step = Increment(system, start, 1.0, one)
         try:
-            with np.errstate(all="ignore"):  # overflow shows in the residual
-                result = step.reached(step.solve(False))
+            result = step.reached(step.solve(False))
             break
         except LoadStepFailed:
             if k == len(tries) - 1:

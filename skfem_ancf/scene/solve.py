@@ -98,7 +98,7 @@ def solve_static(system: System, u: Array | None, memory: Array | None,
 def _state(system, result):
     return State(system, result.u, result.load, result.force, result.converged, result.iterations,
                  result.message, result.steps, result.multipliers, doubt=result.doubt,
-                 memory=result.memory, turns=result.turns)
+                 memory=result.memory, seen=result.seen)
 
 
 # what a solution uses, and why

@@ -255,7 +255,7 @@ def descend(increment: Any, iterate: Callable[..., Equilibrium],
     u, multipliers = start.u, start.multipliers
     for _ in range(KICKS):
         found = iterate((u, multipliers))
-        u, multipliers, _ = found
+        u, multipliers = found.u, found.multipliers
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
             return found
         descent.saw_unstable = True

@@ -11,11 +11,11 @@ from ..core import Array, ConvergenceError
 from ..core.band import NO_FACTORS
 from ..equations import stability
 from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, joint_gap, rules_of
-from ..equations.evaluation import Target
+from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
 from . import descent
-from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Start,
-                        find_equilibrium)
+from .iteration import (CONVERGED, INDEFINITE, ITERATIONS, NOT_CONVERGED, NOT_FINITE, SINGULAR,
+                        equilibrium)
 from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                       StaticResult, Unstable)
 from .contact_search import MOST_FROM_SOFT, search_contact
@@ -87,6 +87,7 @@ class Increment:
         self.load, self.time = options.route.acting(level)
         self.record = LoadStep(level)
 
+    @np.errstate(all="ignore")  # overflow shows in the residual
     def solve(self, stable: bool) -> Equilibrium:
         """The equilibrium, a stable one if requested; raises LoadStepFailed."""
         system, start, route = self.system, self.start, self.options.route
@@ -108,7 +109,7 @@ class Increment:
         scene that just touches an obstacle."""
         system, (u, multipliers) = self.system, (self.start.u, self.start.multipliers)
         tables = system.backend.tables
-        target, *_ = self._target(tables, u, multipliers, system.solver)
+        target, *_ = self._target(tables, u, system.solver)
         force = system.internal_force(u, self.time, self.load)
         missing = self.load * system.external_force(u) - force
         gap = joint_gap(system.constraints.constraint(u, self.load), tables.plain.joints.sizes)
@@ -125,7 +126,7 @@ class Increment:
         return StaticResult(**vars(start) | {
             "steps": [*start.steps, self.record], "load": self.level,
             "rubbed": start.rubbed + lost, "memory": memory, "u": found.u,
-            "multipliers": found.multipliers, "force": found.force})
+            "multipliers": found.multipliers, "force": found.force, "seen": found.seen})
 
     def _augmented(self):
         """Repeat with corrected pressures until the penetration is within tolerance.
@@ -207,41 +208,52 @@ class Increment:
         system, options = self.system, options or self.options
         u = self.start.u if options.guess is None else options.guess
         u, multipliers = (begin or (u, self.start.multipliers))[:2]
-        backend = backend or system.backend
-        rules = rules_of(system, options.method, options.tol, options.most,
-                         BY_THIRD if by_third else
-                         BY_SECOND_OR_LATE if options.watched and not solver else NEVER)
-        by = solver or system.solver
-        target, start, factors = self._target(backend.tables, u, multipliers, by)
+        backend, by, drag = backend or system.backend, solver or system.solver, options.drag
+        give_up = BY_THIRD if by_third else (
+            BY_SECOND_OR_LATE if options.watched and not solver else NEVER)
+        rules = rules_of(system, options.method, options.tol, options.most, give_up)
+        tables = backend.tables
+        target, factors, gap, moved = self._target(tables, u, by)
+        c, g = tables.at(self.time)
+        status, record = INDEFINITE, np.empty((2, rules.iterations + 1))
         try:
-            with np.errstate(all="ignore"):  # overflow shows in the residual
-                x = find_equilibrium(backend, target, rules, by, start, factors,
-                                     backend.tables.at(self.time))
+            while status == INDEFINITE:
+                x, m = np.zeros((ROWS, system.N)), np.zeros((4, len(multipliers)))
+                x[U], x[GAP], x[MOVED], x[DRAG] = u, gap, moved, 0.0 if drag is None else drag
+                m[0], m[3] = multipliers, c
+                run = backend.of(equilibrium, ITERATIONS, not target.definite)
+                status, k, n, definite, seen = run(target, rules, factors, g, x, m, np.zeros(
+                    (2, tables.stresses_size)), record)
+                target = target._replace(definite=False)
         except (ConvergenceError, np.linalg.LinAlgError) as failure:  # of a law
             raise LoadStepFailed(str(failure)) from None
-        n = len(x.works)
+        if definite:
+            backend.keep_factors()
+            by.keep_band()
         self.record.iterations += n
-        self.record.force_residuals += x.residuals
-        self.record.energy_residuals += x.works
-        self._require_converged(x.status, n, rules)
-        if system.inverted(x.u):
+        self.record.force_residuals += record[0, :k].tolist()
+        self.record.energy_residuals += record[1, :n].tolist()
+        if status != CONVERGED:
+            self._failed(status, n, rules)
+        if system.inverted(x[U]):
             raise LoadStepFailed("an element is turned inside out")
-        if lost := system.constraints.lost(x.u):
+        if lost := system.constraints.lost(x[U]):
             raise LoadStepFailed(lost)
         if n == 0:  # factorise the first tangent, if it is that of the solution
-            tables, solver = backend.tables, system.solver
+            solver = system.solver
             try:
                 if (backend is not system.backend or tables.prestressed
                         or tables.plain.loads.custom):
                     solver.forget()
                 else:
-                    solver.factorize(x.u, target.at, x.multipliers)
+                    solver.factorize(x[U], target.at, m[0])
             except NO_FACTORS:
                 solver.forget()
-        return Equilibrium(x.u, x.multipliers, x.force)
+        return Equilibrium(x[U], m[0], x[FORCE], seen)
 
-    def _target(self, tables, u, multipliers, solver):
-        """The Target of the level, the Start, and load factors, for a solver."""
+    def _target(self, tables, u, solver):
+        """The Target of the level for a solver, load factors, residual that may remain, and
+        prescribed changes of fixed DOFs."""
         system, route = self.system, self.options.route
         gap, clock, fixed = route.gap, system.clock, system.constraints.fixed
         values = system.constraints.values(self.time if clock is None else self.load, self.time)
@@ -251,8 +263,8 @@ class Increment:
             begin = route.u[fixed]
             values = begin + self.level * (values - begin)
             gap = (1.0 - self.level) * gap
-        drag = 0.0 if self.options.drag is None else self.options.drag
-        gap = gap - drag * self.start.u
+        if self.options.drag is not None:
+            gap = gap - self.options.drag * self.start.u
         moved, changes = 0.0, values - u[fixed]
         if moving := bool(np.logical_or.reduce(changes)):
             moved = np.zeros(system.N)
@@ -262,14 +274,13 @@ class Increment:
             first = tables.static_factors(self.load, route.acting(self.start.load)[0])
         if clock is not None:
             factors = first = self.load * tables.factors(np.array([clock]))[0]
-        when = np.nan if clock is None else clock
         definite = solver is system.solver and system.symmetric and solver.at_times
-        target = Target(self.load, when, self.time, moving, solver.handle, definite)
-        return target, Start(u, multipliers, gap, moved, drag), np.array([factors, first])
+        target = Target(self.load, np.nan if clock is None else clock, self.time, moving,
+                        solver.handle, definite)
+        return target, np.array([factors, first]), gap, moved
 
-    def _require_converged(self, status, n, rules):
-        if status == CONVERGED:
-            return
+    def _failed(self, status, n, rules):
+        """Raise LoadStepFailed after n corrections."""
         if status == NOT_CONVERGED and n < rules.iterations:
             if rules.give_up == BY_SECOND_OR_LATE and n == 2:
                 raise FirstStepTooLarge("the first correction is far too large")

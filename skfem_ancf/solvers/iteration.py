@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
@@ -10,13 +10,12 @@ from ..actions.contact.tables import is_clear
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
-from ..core import F1, MADE, Array, apart, indices, source
-from ..equations.backend import Backend
+from ..core import F1, MADE, apart, indices, source
 from ..equations.convergence import (CLOSED, FEWEST, NEVER, Rules, diverges, is_balanced,
                                      is_small)
 from ..equations.tables import Equations
-from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, GAP, LOAD, MOVED,
-                                    RESIDUAL, ROWS, U, Target, balance, hold_back)
+from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, LOAD, MOVED,
+                                    RESIDUAL, U, UNSEEN, Target, balance, examine, hold_back)
 
 #: Approximate iterations to an equilibrium, by which work in NumPy is counted.
 ITERATIONS = 8
@@ -24,53 +23,12 @@ ITERATIONS = 8
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE = range(5)
 
 
-class Start(NamedTuple):
-    """The start of an iteration, and what may remain or has to move."""
-
-    u: Array  # (N,)
-    multipliers: Array  # (m,)
-    gap: Any  # residual that may remain, (N,), or 0
-    moved: Any  # prescribed changes of fixed DOFs, (N,), or 0
-    drag: Any = 0.0  # force on each DOF per displacement, (N,), or 0
-
-
-class Iterate(NamedTuple):
-    """The end of an iteration."""
-
-    status: int
-    u: Array  # (N,)
-    multipliers: Array  # (m,)
-    force: Array  # the internal force, (N,)
-    residuals: list[float]  # relative residuals
-    works: list[float]  # roots of the relative works of the corrections
-
-
-def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, start: Start,
-                     factors: Array, joints: tuple[Array, Array]) -> Iterate:
-    """Iterate to the ``target`` by the ``rules`` from ``start``; ``solver.solve_into`` solves the
-    linear systems. ``factors`` (2, k) are load factors and those of the first tangent, ``joints`` c
-    and g."""
-    x, m = np.zeros((ROWS, len(start.u))), np.zeros((4, len(start.multipliers)))
-    stresses, record = np.zeros((2, backend.tables.stresses_size)), np.empty(
-        (2, rules.iterations + 1))
-    x[U], x[GAP], x[MOVED], x[DRAG] = start.u, start.gap, start.moved, start.drag
-    m[0], m[3] = start.multipliers, joints[0]
-    run = backend.of(equilibrium, ITERATIONS, calls=not target.definite)
-    status, n, k, definite = run(target, rules, factors, joints[1], x, m, stresses, record)
-    if status == INDEFINITE:
-        return find_equilibrium(backend, target._replace(definite=False), rules, solver, start,
-                                factors, joints)
-    if definite:
-        backend.keep_factors()
-        solver.keep_band()
-    return Iterate(status, x[U], m[0], x[FORCE], record[0, :n].tolist(), record[1, :k].tolist())
-
-
 @source
 def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
-    """Iterate from x[U] and the multipliers m[0]; ``record`` gets residuals and works. Returns the
-    status, the numbers of residuals and of works, and whether the last factors are those of
-    ``e.factors``."""
+    """Iterate from x[U] and the multipliers m[0], with c of the joints in m[3] and their g.
+    ``factors`` are load factors and those of the first tangent, (2, k); ``record`` gets residuals
+    and works. Returns the status, the numbers of residuals and of works, whether the last factors
+    are those of ``e.factors``, and what :func:`examine` says of an equilibrium."""
     residuals, works = record[0], record[1]
     u, du, force, load, R, moved = x[U], x[DU], x[FORCE], x[LOAD], x[RESIDUAL], x[MOVED]
     multipliers, phi, dm = m[0], m[1], m[2]
@@ -85,7 +43,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
                 rules.mixed and k > 0, g, x, m, stresses, norms)
         rho, size, joint_gap = norms[0], norms[1], norms[2]
         if not rho < 1e300:
-            return NOT_FINITE, k, k, by_band and k > 0
+            return NOT_FINITE, k, k, by_band and k > 0, UNSEEN
         residuals[k] = rho / size if size > 0.0 else 0.0
         if k == 0:
             balanced = rho <= 1e-3 * rules.tol * size and joint_gap <= CLOSED
@@ -94,18 +52,18 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         else:
             balanced = last and is_balanced(rho, size, joint_gap, rules.tol, rules.force_noise)
         if balanced and not moving:
-            return CONVERGED, k + 1, k, by_band and k > 0
+            return CONVERGED, k + 1, k, by_band and k > 0, examine(e, u, stresses[0])
         if k == rules.iterations:
-            return NOT_CONVERGED, k + 1, k, by_band and k > 0
+            return NOT_CONVERGED, k + 1, k, by_band and k > 0, UNSEEN
         if last:
             balance(e, target, factors, BETWEEN, rules.mixed, g, x, m, stresses, norms)
         if moving:
             _move(e, target, g, moved, u, R, phi)
         if by_band:
             if e.forces.changing > 0 and not is_clear(e.forces.clear, u, 0.0):
-                return INDEFINITE, k + 1, k, False
+                return INDEFINITE, k + 1, k, False, UNSEEN
             if solve_definite(e.K, e.factors, e.fixed, R, du) == 0:
-                return INDEFINITE, k + 1, k, False
+                return INDEFINITE, k + 1, k, False, UNSEEN
             good = True
         else:
             for i in indices(phi.size):
@@ -115,7 +73,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if good:
             work = np.sqrt(abs(dot(R, du)) + abs(dot(phi, dm)))
         if not work < 1e300:
-            return SINGULAR, k + 1, k, False
+            return SINGULAR, k + 1, k, False, UNSEEN
         if moving:
             add_multiple(1.0, moved, du)
         elif e.forces.contacts.number > 0 or e.forces.changing > 0:
@@ -127,7 +85,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         works[k] = work / reference if reference > 0.0 else 0.0
         k += 1
         if rules.give_up > NEVER and diverges(rules.give_up, k - 1, works[k - 1]):
-            return NOT_CONVERGED, k, k, by_band
+            return NOT_CONVERGED, k, k, by_band, UNSEEN
         contraction = work / before if before > 0.0 else 1.0
         last = (k >= FEWEST or at_rest) and is_small(work, contraction, rules.tol, reference,
                                                      rules.noise)

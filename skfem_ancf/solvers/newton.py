@@ -323,7 +323,8 @@ class Search:
         result = self._beginning(self.route)
         step = Increment(self.system, result, 1.0, self._options(self.route, "mixed")._replace(
             most=0))
-        return step.reached(step.resting() or step.iterate())
+        with np.errstate(all="ignore"):  # overflow shows in the residual
+            return step.reached(step.resting() or step.iterate())
 
     def one_step(self, method: str, route: Route | None = None) -> StaticResult:
         """The equilibrium at the end of a route in one step."""
@@ -334,8 +335,7 @@ class Search:
             options = options._replace(most=min(MOST_FROM_SOFT, options.most))
         step = Increment(self.system, result, 1.0, options)
         try:
-            with np.errstate(all="ignore"):  # overflow shows in the residual
-                found = step.solve(self._ends_stable(route))
+            found = step.solve(self._ends_stable(route))
             # a later strategy may find an equilibrium on the side away from the load
             if (self.attempts and self.stable and route.proportional
                     and not (self.stabilised_by_loads or self.touches)
@@ -415,10 +415,9 @@ class Search:
                 pass
             raise LoadStepFailed("the loads do not hold what the supports leave free" + (
                 f": nothing holds {self._loose}" if self._loose else ""))
-        if not self._auto:
+        if not self._auto or result.seen:
             return
         bends = [bent(beam, result.u[s]) for beam, s in zip(system.beams, system.slices)]
-        result.turns = [turn for turn, _ in bends]
         if any(folded or (turn > FOLDED and beam.element.axis_degree <= 7)
                for beam, (turn, folded) in zip(system.beams, bends)):
             again = self._folded is not None and np.allclose(
@@ -462,8 +461,7 @@ class Search:
                     load = 1.0
                 step = Increment(self.system, result, load, options)
                 try:
-                    with np.errstate(all="ignore"):  # overflow shows in the residual
-                        found = step.solve(stable)
+                    found = step.solve(stable)
                 except LoadStepFailed as failure:
                     result.rejected += 1
                     cuts += isinstance(failure, Unstable)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ..core import Array
+from ..equations.evaluation import UNSEEN
 
 
 @dataclass
@@ -67,8 +68,9 @@ class StaticResult:
         Whether the equilibrium of the linearised law was no better start; it is not tried again.
     attempts
         An :class:`Attempt` for each strategy tried; the last one succeeded.
-    turns
-        Largest rotation of the axis of each beam over an element, in radians, if known.
+    seen
+        What is within the range of the model, see
+        :func:`~skfem_ancf.equations.evaluation.examine`.
     """
 
     u: Array
@@ -85,7 +87,7 @@ class StaticResult:
     rubbed: float = 0.0
     diverging: bool = False
     attempts: tuple[Attempt, ...] = ()
-    turns: list[float] | None = None
+    seen: int = UNSEEN
 
     @property
     def iterations(self) -> int:
@@ -94,11 +96,12 @@ class StaticResult:
 
 
 class Equilibrium(NamedTuple):
-    """Displacement (N,), multipliers (m,) and internal force (N,) of an equilibrium."""
+    """Displacement (N,), multipliers (m,), internal force (N,) and range of an equilibrium."""
 
     u: Array
     multipliers: Array
     force: Array
+    seen: int = UNSEEN
 
 
 class LoadStepFailed(Exception):
