@@ -351,8 +351,8 @@ def test_what_an_iteration_has_seen_is_within_the_range(element, curved):
     assert found == ({UNSEEN, AXES, RANGE} if certain else {UNSEEN, AXES})
 
 
-@pytest.mark.parametrize("n, turn, text", [(40, 12.0, "overlap"), (8, 9.0, "too coarse.*turns by 1.1"),
-                                           (8, 7.0, "")])
+@pytest.mark.parametrize("n, turn, text", [
+    (40, 12.0, "overlap"), (8, 9.0, "too coarse.*turns by 1.1"), (8, 7.0, "")])
 def test_bending_beyond_the_range_is_told(n, turn, text, recwarn):
     """Sections of height 0.2 overlap from the curvature 10 on, and 1 rad an element is too far."""
     rod = Beam(line(n, 0.2), ElementBeamCable(3), StVenantKirchhoff(E, NU), width=B)

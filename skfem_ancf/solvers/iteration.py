@@ -11,7 +11,7 @@ from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
 from ..core import F1, MADE, apart, indices, source
-from ..equations.convergence import (CLOSED, FEWEST, NEVER, Rules, diverges, is_balanced,
+from ..equations.convergence import (CLOSED, FEWEST, NEVER, diverges, is_balanced,
                                      is_small)
 from ..equations.tables import Equations
 from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, LOAD, MOVED,
