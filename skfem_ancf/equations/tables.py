@@ -15,7 +15,6 @@ from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.histories import remembering
 from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
-from ..beam import kinematics
 from ..beam.kernels.tables import CABLE, OF_H, linearised
 from ..core.callbacks import handle_of
 from ..core.words import constant
@@ -228,8 +227,9 @@ class Tables:
         sections that overlap."""
         beams, nodes, rest, limits = self.system.beams, [_NO_NODES], [np.zeros((8, 0))], []
         for beam, s in zip(beams, self.system.slices):
-            (left, right), slopes = kinematics.ends(beam, beam.q0_local)
-            parts = np.array([*slopes, right - left, beam._turned_back])
+            axis = beam.q0_local.view(complex).reshape(-1, beam.nd // 2)[:, :2]
+            (left, a), (right, b) = axis[beam.mesh.t].transpose(0, 2, 1)
+            parts = np.array([a, b, right - left, a * b.conj()])
             rest.append(parts.view(float).reshape(4, -1, 2).transpose(0, 2, 1).reshape(8, -1))
             nodes.append(s.start + beam.nd * beam.mesh.t)
         high = max((beam.mesh.height for beam in beams), default=0.0)
