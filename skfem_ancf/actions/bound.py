@@ -13,7 +13,7 @@ from ..beam.beam import Beam
 from ..beam.distribution import Facets
 from ..beam.layout import Layout
 from ..core import (Array, ArrayLike, InputError, cached_property, is_builtin, refuse,
-                    require_finite, require_slope, shown, warnings_as_errors)
+                    along, require_finite, require_slope, shown, warnings_as_errors)
 from .places import Vector
 
 #: Relative step of differences, where a force does not accept complex numbers.
@@ -463,42 +463,39 @@ def _require_derivatives(bound, x, u, d):
     v, d = u.reshape(x.shape), d.reshape(x.shape)
     for name, at in (("stiffness", lambda s: (x + v + s * d, 0.0 * d, 0.0)),
                      ("resistance", lambda s: (x, v + s * d, 0.0))):
-        before, now, after = (np.asarray(bound.force(*at(s))) for s in (-1.0, 0.0, 1.0))
-        slope = (_matrix(getattr(bound, name)(*at(0.0)), d.size) @ d.ravel()).reshape(d.shape)
-        require_slope(f"{name}(x, v, t) of {bound!r}", "force(x, v, t)", after - before,
-                      2.0 * slope, 1e-12 * np.abs(now).max())
+        require_slope(f"{name}(x, v, t) of {bound!r}", "force(x, v, t)", along(
+            lambda s, at=at: bound.force(*at(s))),
+            _matrix(getattr(bound, name)(*at(0.0)), d.size) @ d.ravel())
 
 
 def _require_potential(bound, x, u, d):
     """Raise InputError unless the force without velocities is minus the slope of the potential."""
     x, d = x + u.reshape(x.shape), d.reshape(x.shape)
     for t in (0.0, ASIDE):
-        now, before, after = (bound.potential_at(x + s * d, t) for s in (0.0, -1.0, 1.0))
-        work = 2.0 * np.sum(bound.force(x, 0.0 * x, t) * d)
-        require_slope(f"minus force(x, v, t) of {bound!r}", "potential(x)", after - before, -work,
-                      1e-12 * abs(now), ". Without potential(x), as for a force that depends on "
-                      "time, the energy balance is that of the scheme")
+        require_slope(f"minus force(x, v, t) of {bound!r}", "potential(x)", along(
+            lambda s, t=t: bound.potential_at(x + s * d, t)),
+            -np.sum(bound.force(x, 0.0 * x, t) * d), else_=". Without potential(x), as for a force "
+            "that depends on time, the energy balance is that of the scheme")
 
 
 def require_derivatives(joint: BoundConstraint, sizes: Array, u: Array, d: Array) -> None:
     """Raise InputError unless jacobian and curvature of a user-defined joint fit its value."""
     multipliers = np.cos(np.arange(len(joint.equations)))
     try:
-        value, *values = (np.asarray(joint.value(u + s * d, 0.0)) for s in (0.0, -1.0, 1.0))
-        J, *others = (joint.jacobian(u + s * d, 0.0) for s in (0.0, -1.0, 1.0))
+        values = along(lambda s: joint.value(u + s * d, 0.0))
+        before, J, after = (joint.jacobian(u + s * d, 0.0) for s in (-1.0, 0.0, 1.0))
         found = joint.curvature(u, 0.0, multipliers)
     except Exception:  # it may not be defined there
         return
-    require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values[1] - values[0],
-                  2.0 * (J @ d), 1e-13 * max(1.0, np.abs(value).max()) * np.abs(sizes).max())
+    require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values, J @ d,
+                  1e-13 * max(1.0, np.abs(values[1]).max()) * np.abs(sizes).max())
     turned = 0.0 * u
     if found is not None:
         i, j, v = found
         np.add.at(turned, i, v * d[j])
-    change = multipliers @ (others[1] - others[0])
     require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero unless it is defined,",
-                  "multipliers @ jacobian(u, t)", change * sizes, 2.0 * turned * sizes,
-                  1e-12 * np.max(np.abs(multipliers @ J) * sizes, initial=0.0))
+                  "multipliers @ jacobian(u, t)",
+                  [multipliers @ one * sizes for one in (before, J, after)], turned * sizes)
 
 
 def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:

@@ -14,8 +14,8 @@ from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, S
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
-from ..core import (Array, ArrayLike, InputError, NameUnknown, Place, TimeFunction, ask, gauss,
-                    product_rule, refuse, require_finite, require_flag, require_function,
+from ..core import (Array, ArrayLike, InputError, NameUnknown, Place, TimeFunction, along, ask,
+                    gauss, product_rule, refuse, require_finite, require_flag, require_function,
                     require_module, require_slope)
 from .bound import at_generic_displacements
 from .item import Item
@@ -448,22 +448,19 @@ class Energy(Density):
         for part in self._parts:
             y, dy = self._variables(u, part), self._variables(d, part)
             dy -= self._variables(0.0 * d, part)
-            psi, before, after = (self._density(y + s * dy, part) for s in (0.0, -1.0, 1.0))
-            slopes = [self._slope(y + s * dy, part) for s in (-1.0, 0.0, 1.0)]
-            for name, one in (("psi", psi), ("its gradient", slopes[1])):
-                require_finite(f"{name} of {self!r}", one)
-            noise = 1e-13 * np.max(np.abs(psi))
+            psi = along(lambda s, y=y, dy=dy, part=part: self._density(y + s * dy, part))
+            slopes = along(lambda s, y=y, dy=dy, part=part: self._slope(y + s * dy, part))
+            for name, one in (("psi", psi), ("its gradient", slopes)):
+                require_finite(f"{name} of {self!r}", one[1])
             own = self.gradient is None
             require_slope(
                 f"the complex step of psi of {self!r}" if own else f"gradient of {self!r}", "psi",
-                (after - before).ravel(), 2.0 * np.einsum("kep,kep->ep", slopes[1], dy).ravel(),
-                noise, "; psi has to take complex arrays (no abs, real, comparisons), or give "
-                "gradient=" if own else "")
+                psi, np.einsum("kep,kep->ep", slopes[1], dy), else_="; psi has to take complex "
+                "arrays (no abs, real, comparisons), or give gradient=" if own else "")
             H = require_finite(f"the second derivatives of {self!r}", self._curvature(y, part))
             if self.hessian is not None or not own:
-                require_slope(f"hessian of {self!r}", "gradient", (slopes[2] - slopes[0]).ravel(),
-                              2.0 * np.einsum("klep,lep->kep", H, dy).ravel(),
-                              1e-13 * np.max(np.abs(slopes[1])))
+                require_slope(f"hessian of {self!r}", "gradient", slopes,
+                              np.einsum("klep,lep->kep", H, dy))
 
     def _require_invariance(self):
         """Raise InputError where psi changes under rigid motions."""

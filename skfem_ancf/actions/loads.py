@@ -19,8 +19,9 @@ from ..beam.kinematics import direction, element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
 from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,
-                    ask_field, ask_number, gauss, is_builtin, read_only, refuse, require_finite,
-                    require_finite_scalar, require_function, require_slope, sample, shown, warn)
+                    along, ask_field, ask_number, gauss, is_builtin, read_only, refuse,
+                    require_finite, require_finite_scalar, require_function, require_slope, sample,
+                    shown, warn)
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .bound import BoundForce, at_generic_displacements, require_entries, user_parts
@@ -310,22 +311,18 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
 def _require_derivatives(load, u, d):
     """Raise InputError unless stiffness and potential of a user-defined load fit its force."""
     try:
-        force, *forces = (load.force(u + s * d) for s in (0.0, -1.0, 1.0))
-        potentials = [load.potential(u + s * d) for s in (0.0, -1.0, 1.0)]
+        force = along(lambda s: load.force(u + s * d))
+        potential = along(lambda s: load.potential(u + s * d))
         i, j, v = load.stiffness(u)
     except Exception:  # it may be defined in the reference configuration only
         return
-    K, noise = sparse.coo_array((v, (i, j)), shape=(len(u), len(u))), 1e-13 * np.abs(force).max()
-    require_slope(f"stiffness(u) of {load!r}", "force(u)", forces[1] - forces[0], 2.0 * (K @ d),
-                  noise)
+    K = sparse.coo_array((v, (i, j)), shape=(len(u), len(u)))
+    require_slope(f"stiffness(u) of {load!r}", "force(u)", force, K @ d)
     if load.symmetric:
-        require_slope(f"stiffness(u) of {load!r}, transposed,", "force(u)", forces[1] - forces[0],
-                      2.0 * (K.T @ d), noise,
-                      "; a load without a potential says so in its class: symmetric = False")
-    if potentials[0] is not None:
-        require_slope(f"minus force(u) of {load!r}", "potential(u)",
-                      np.array([potentials[2] - potentials[1]]), np.array([-2.0 * (force @ d)]),
-                      1e-13 * abs(potentials[0]))
+        require_slope(f"stiffness(u) of {load!r}, transposed,", "force(u)", force, K.T @ d, else_=(
+            "; a load without a potential says so in its class: symmetric = False"))
+    if load.potential(u) is not None:
+        require_slope(f"minus force(u) of {load!r}", "potential(u)", potential, -force[1] @ d)
 
 
 class Weight(Load):

@@ -13,7 +13,7 @@ from skfem import Basis, BilinearForm, ElementVector, LinearForm
 from skfem.assembly.dofs import DofsView
 
 from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, NameUnknown,
-                    explained, gauss, read_only, refuse, require_finite, require_label,
+                    along, explained, gauss, read_only, refuse, require_finite, require_label,
                     require_slope, shown)
 from ..materials import Material
 from ..mesh.places import as_point, is_point
@@ -266,11 +266,9 @@ class Domain(Immutable):
         mesh = self.basis.mesh  # strains are small in the thinnest cell
         thin = np.min(self.basis.dx.sum(axis=1) / np.ptp(mesh.p[:, mesh.t], axis=1).max(axis=0))
         u, v = thin * np.array([[1e-2], [1e-4]]) * np.cos(np.arange(2.0 * self.N)).reshape(2, -1)
-        before, now, after = (require_finite(f"the residual of {self!r}", self.force(u + s * v))
-                              for s in (-1.0, 0.0, 1.0))
-        K = self.matrix(u)
-        require_slope(f"the tangent of {self!r}", "the residual", after - before, 2.0 * (K @ v),
-                      1e-12 * np.abs(now).max())
+        forces, K = along(lambda s: require_finite(
+            f"the residual of {self!r}", self.force(u + s * v))), self.matrix(u)
+        require_slope(f"the tangent of {self!r}", "the residual", forces, K @ v)
         self.symmetric = bool(abs(K - K.T).max() <= 1e-10 * abs(K).max())
 
     # the interface of a beam

@@ -383,13 +383,19 @@ def require_unmasked(name: str, value: Any) -> None:
 SLOPE = 0.01
 
 
-def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
+def along(function: Callable[[float], Any]) -> list[Array]:
+    """Values of a function at -1, 0 and 1, for :func:`require_slope`."""
+    return [np.asarray(function(s)) for s in (-1.0, 0.0, 1.0)]
+
+
+def require_slope(what: str, of: str, values: Sequence[Any], slope: Any, noise: float | None = None,
                   else_: str = "") -> None:
-    """Raise InputError unless ``slope``, times a step, is close to ``change`` over that step.
-    ``what`` and ``of`` are names of derivative and function, ``noise`` is the round-off of the
-    change; ``else_`` ends the message."""
-    change, slope = np.ravel(change), np.ravel(slope)
+    """Raise InputError unless ``slope`` is the derivative of ``values`` of :func:`along`. ``what``
+    and ``of`` are names of derivative and function; ``noise`` is the round-off of a difference."""
+    change, slope = np.ravel(values[2] - values[0]), 2.0 * np.ravel(slope)
     off = np.abs(change - slope)
+    if noise is None:
+        noise = 1e-12 * np.max(np.abs(values[1]), initial=0.0)
     if not np.max(off, initial=0.0) <= SLOPE * np.max(np.abs([change, slope])) + noise:  # or NaN
         k = np.argmax(off)
         raise InputError(f"{what} is not the derivative of {of}: over a small step it gives "
