@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .core import (Array, ArrayLike, CallError, CallbackError, InputError, Interrupted, NameUnknown,
-                   PickleError, SweepWarning, refuse, require_function, require_integer,
-                   require_like, require_module, shown, warn)
+from .core import (Array, ArrayLike, CallError, CallbackError, InputError, Interrupted, PickleError,
+                   SweepWarning, refuse, require_function, require_integer, require_like,
+                   require_module, require_option, shown, warn)
 from .core.progress import progress_bar
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -65,9 +65,7 @@ class Sweep:
 
     def __getitem__(self, name: str) -> Array:
         known = {**self.parameters, **self.values}
-        if not isinstance(name, str) or name not in known:
-            raise NameUnknown("array", name, known)
-        return known[name]
+        return known[require_option("array", name, known)]
 
     def to_xarray(self) -> Any:
         """An ``xarray.Dataset``: values along "member", with the parameters as coordinates.

@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from skfem import Basis, BilinearForm, ElementVector, LinearForm
 from skfem.assembly.dofs import DofsView
 
-from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, NameUnknown,
-                    along, explained, gauss, read_only, refuse, require_finite, require_label,
-                    require_slope, shown)
+from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, along,
+                    explained, gauss, read_only, refuse, require_finite, require_label,
+                    require_option, require_slope, shown)
 from ..materials import Material
 from ..mesh.places import as_point, is_point
 from .solid import SolidForms, grade_at
@@ -374,8 +374,8 @@ class Domain(Immutable):
     def _facets(self, boundary: Any) -> Array:
         """Facet numbers of a boundary in a form that scikit-fem accepts."""
         mesh = self.basis.mesh
-        if isinstance(boundary, str) and boundary not in (mesh.boundaries or {}):
-            raise NameUnknown("boundary", boundary, list(mesh.boundaries or {}))
+        if isinstance(boundary, str):
+            require_option("boundary", boundary, mesh.boundaries or {})
         refuse(is_point(boundary), "a boundary of {!r} is needed here, got the point {!r}; "
                "scene.pin supports a point, and scene.hinge connects it to another one", self,
                boundary)
@@ -402,8 +402,8 @@ class Domain(Immutable):
             found = np.sort(self.numbers(view.all()))
         names = ["u"] if names is None else [names] if isinstance(names, str) else list(names)
         for one in names:
-            if one not in ("u", "r", *self.dofnames):
-                raise NameUnknown("degree of freedom", one, ["u", *self.dofnames])
+            if one != "r":
+                require_option("degree of freedom", one, ["u", *self.dofnames])
         kept = [c for c in range(2) if {"u", "r", f"u^{c + 1}"} & set(names)]
         return found[np.isin(found % 2, kept)]
 

@@ -14,7 +14,8 @@ from ..beam.layout import WhichBeam
 from ..beam.points import Located
 from ..core.archive import output_file
 from ..core import (Array, CallbackError, CheckpointError, Immutable, InputError, NameUnknown,
-                    StrPath, ask_array, refuse, require_flag, require_module, require_path, shown)
+                    StrPath, ask_array, refuse, require_flag, require_module, require_option,
+                    require_path, shown)
 from ..equations.system import System
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
@@ -62,8 +63,7 @@ class Sensor(Immutable):
                    "leave out at=, got {!r}", at)
             return
         known = (*MOVING, *SECTION, *CONTACT, "joint_force", *FIELDS)
-        if not isinstance(what, str) or what not in known:
-            raise NameUnknown("quantity of a sensor", what, known)
+        require_option("quantity of a sensor", what, known)
         if what == "joint_force":
             refuse(not isinstance(at, Joint), 'a sensor of "joint_force" needs at=joint, one of '
                    'scene.joints, got {!r}', at)

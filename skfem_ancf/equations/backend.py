@@ -11,8 +11,7 @@ from threading import RLock
 from typing import Any, NamedTuple
 
 from ..beam.kernels.law import CUSTOM, HISTORY
-from ..core import code_cache
-from ..core import cached_property
+from ..core import cached_property, code_cache
 from ..core.callbacks import deferred, raise_kept
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, wanted

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core import InputError, NameUnknown, shown
+from ..core import InputError, require_option, shown
 
 #: Metres and newtons in a unit.
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
@@ -52,9 +52,7 @@ def values_of(name: str, units: Any) -> tuple[dict[str, float], str]:
         raise InputError(f"units must be a force of {', '.join(FORCES)} and a length of "
                          f"{', '.join(LENGTHS)}, as ('N', 'mm'), got {shown(units)}") from None
     known = STANDARD | TYPICAL
-    if name not in known:
-        raise NameUnknown("material", name, known)
-    E, nu, density, expansion, strength = known[name]
+    E, nu, density, expansion, strength = known[require_option("material", name, known)]
     stress = length**2 / force
     return dict(E=1e9 * E * stress, nu=nu, density=density * length**4 / force,
                 thermal_expansion=1e-6 * expansion, strength=1e6 * strength * stress), (

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..core import (Array, InputError, MeshError, ModelWarning, NameUnknown, ask_field, refuse,
                     require_finite, require_integer, require_label, require_moderate,
-                    require_not_negative, require_unmasked, shown, warn)
+                    require_not_negative, require_option, require_unmasked, shown, warn)
 from .curve import Curve
 from .mesh_beam import MeshBeam
 from .places import is_point, points_of_rows, satisfying
@@ -312,9 +312,7 @@ class FrameGraph:
     def lines_of(self, given: Any) -> Array:
         """Numbers of lines, shape (k,), from the name of a group, a number, or a list of these."""
         if isinstance(given, str):
-            if given not in self.groups:
-                raise NameUnknown("group of lines", given, self.groups)
-            return self.groups[given]
+            return self.groups[require_option("group of lines", given, self.groups)]
         if isinstance(given, (list, tuple, np.ndarray)):
             return np.unique(np.concatenate([self.lines_of(one) for one in given]))
         return np.array([require_integer("the number of a line", given, 0,

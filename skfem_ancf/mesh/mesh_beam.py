@@ -14,9 +14,8 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
-from ..core import archive, refuse
-from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, NameUnknown,
-                    StrPath, cached_property, is_builtin, packed, require_finite,
+from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, StrPath,
+                    archive, cached_property, is_builtin, packed, refuse, require_finite,
                     require_finite_scalar, require_function, require_integer, require_moderate,
                     require_option, require_options, require_path, require_positive,
                     require_unmasked, shown)
@@ -374,9 +373,7 @@ class MeshBeam(NumberedMesh):
         0.2
         """
         for name in changes:
-            if name not in ("height", "curve"):
-                raise NameUnknown("attribute that may be replaced alone", name,
-                                  ("height", "curve"))
+            require_option("attribute that may be replaced alone", name, ("height", "curve"))
         if "height" in changes:
             names = ("height", "heights", "taper")
             changes |= zip(names, self._heights_of(changes["height"]))

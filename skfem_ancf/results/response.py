@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ..core import (Array, ArrayLike, InputError, NameUnknown, NearMisses, StrPath, refuse,
-                    require_index)
+from ..core import (Array, ArrayLike, InputError, NearMisses, StrPath, refuse, require_index,
+                    require_option)
 from ..visuals.matplotlib import dress, new_axes, page
 from ..visuals.scenery import MUTED
 
@@ -148,7 +148,5 @@ def _finish(ax, label, title, xlabel, ylabel, save):
 
 def _number(kind, which, names):
     if isinstance(which, str):
-        if which not in names:
-            raise NameUnknown(kind, which, names)
-        return names.index(which)
+        return names.index(require_option(kind, which, names))
     return require_index(kind, which, len(names))

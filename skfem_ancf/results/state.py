@@ -21,8 +21,8 @@ from ..beam.distribution import Distribution, Sampled, station_of_node, stations
 from ..beam.domain import Domain, DomainPoints
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
-from ..core import (Array, Immutable, InputError, NameUnknown, NearMisses, Place, cached_property,
-                    first_order, refuse, require_flag, require_integer, step)
+from ..core import (Array, Immutable, InputError, NearMisses, Place, cached_property, first_order,
+                    refuse, require_flag, require_integer, require_option, step)
 from ..equations.evaluation import UNSEEN
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
@@ -348,8 +348,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         known += [name for name in ("error_estimate", "scene", "refinements")
                   if name not in known]
         for name in changes:
-            if name not in known:
-                raise NameUnknown("attribute of State", name, known)
+            require_option("attribute of State", name, known)
         other = self._thawed()
         for name, value in changes.items():
             setattr(other, name, value)

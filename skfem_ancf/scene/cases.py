@@ -10,8 +10,8 @@ import numpy as np
 
 from ..actions.loads import Load
 from ..beam.layout import WhichBeam, select_beam
-from ..core import (AncfError, Array, InputError, NameUnknown, refuse, require_finite_scalar,
-                    require_like)
+from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar, require_like,
+                    require_option)
 from ..results.output import supports_of
 from ..results.state import State
 from .scene import Scene
@@ -96,8 +96,7 @@ class LoadCases(Mapping):
             refuse(not isinstance(factors, Mapping), "combination {!r} must have factors of cases "
                    "by name, as {{'self': 1.35}}, got {!r}", name, factors)
             for case in factors:
-                if case not in self.cases:
-                    raise NameUnknown("load case", case, self.cases)
+                require_option("load case", case, self.cases)
             self.combinations[name] = {case: require_finite_scalar(f"factor of {case!r}", factor)
                                        for case, factor in factors.items()}
         refuse(not self.combinations, "there is no load case: give functions by name, as {'snow': "
@@ -112,8 +111,7 @@ class LoadCases(Mapping):
         name
             The name of the combination.
         """
-        if name not in self.combinations:
-            raise NameUnknown("combination", name, self.combinations)
+        require_option("combination", name, self.combinations)
         scene = copy(self.scene)
         added = [entry._replace(given=entry.given.times(factor) if isinstance(entry.given, Load)
                                 else entry.given,

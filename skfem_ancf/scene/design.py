@@ -10,8 +10,8 @@ import numpy as np
 from scipy import sparse
 
 from ..actions.bound import derivative
-from ..core import (Array, ArrayLike, ConvergenceError, InputError, NameUnknown, ask, ask_array,
-                    refuse, require_finite, require_function, require_module)
+from ..core import (Array, ArrayLike, ConvergenceError, InputError, ask, ask_array, refuse,
+                    require_finite, require_function, require_module, require_option)
 from ..core.band import NO_FACTORS
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
@@ -190,9 +190,8 @@ class Design:
 
     def _sensors(self, scene):
         for one in self.readings:
-            if isinstance(one, str) and one not in scene.sensors:
-                raise NameUnknown("sensor", one, scene.sensors)
-            yield scene.sensors[one] if isinstance(one, str) else one
+            yield (scene.sensors[require_option("sensor", one, scene.sensors)]
+                   if isinstance(one, str) else one)
 
     def _read(self, scene, state):
         """Values of the readings; those of eigenvalues are the ones found."""

@@ -16,8 +16,8 @@ from ..actions.bound import BoundConstraint, BoundForce, derivative
 from ..actions.loads import Unscaled
 from ..actions.tables import mean_external_force
 from ..beam.kinematics import element_dofs, entries_of
-from ..core import (Array, ArrayLike, InputError, NameUnknown, refuse, require_flag,
-                    require_integer, require_positive)
+from ..core import (Array, ArrayLike, InputError, refuse, require_flag, require_integer,
+                    require_option, require_positive)
 from ..dynamics import GeneralizedAlpha, get_scheme
 from ..dynamics.base import Motion, Scheme, in_steps
 from ..dynamics.history import state_of
@@ -138,8 +138,7 @@ class MotionDesign(Design):
             raise InputError(f"{own[0]!r} has a Jacobian of its own in steps that conserve energy, "
                              "without derivatives: use the scheme 'generalized-alpha'")
         for name in self.readings:
-            if not isinstance(name, str) or name not in scene.sensors:
-                raise NameUnknown("sensor", name, scene.sensors)
+            require_option("sensor", name, scene.sensors)
         self._p, self._built, self.state, self._J, self._coloured = p, scene, state, None, {}
         n = max(1, round(self.t_end / self.dt))
         kept = None if self.every == 1 else self.dt * np.append(np.arange(0, n, self.every), n)

@@ -12,8 +12,8 @@ import scipy
 
 from ..actions.item import Item
 from ..beam.beam import Beam
-from ..core import (Array, Immutable, InputError, NameUnknown, ask_array, is_builtin, rebuilt,
-                    refuse, require_option, shown)
+from ..core import (Array, Immutable, InputError, ask_array, is_builtin, rebuilt, refuse,
+                    require_option, shown)
 from ..mesh.mapping import PLACES
 from ..mesh.mesh_beam import MeshBeam
 from ..sections.section import Layers, Profile, Rectangle
@@ -180,8 +180,7 @@ class Parameters:
         """The values of a field at nodes or in elements."""
         if not isinstance(beam, Beam) or not any(beam is one for one in self._scene.beams):
             raise InputError(f"fields are of beams of the scene, got {shown(beam)}")
-        if name not in FIELD_NAMES:
-            raise NameUnknown("field of a beam", name, FIELD_NAMES)
+        require_option("field of a beam", name, FIELD_NAMES)
         mesh, n = beam.mesh, beam.mesh.p.shape[1]
         if name == "height" and mesh.heights is not None:
             if field == "elements":

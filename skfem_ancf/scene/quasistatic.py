@@ -13,8 +13,8 @@ import numpy as np
 from ..actions.forces.springs import Turns
 from ..actions.obstacles.obstacle import stiffest
 from ..core import (Array, ArrayLike, ConvergenceError, Immutable, InputError, Interrupted,
-                    ModelWarning, NameUnknown, refuse, require_finite, require_flag,
-                    require_increasing, require_integer, require_positive, warn)
+                    ModelWarning, refuse, require_finite, require_flag, require_increasing,
+                    require_integer, require_option, require_positive, warn)
 from ..core.progress import progress_bar
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import COLUMNS, History, state_of
@@ -23,8 +23,7 @@ from ..equations.stability import largest_displacement, position_weights
 from ..equations.system import System
 from ..results.state import State
 from ..solvers.increment import Increment, Options, Route
-from ..solvers.newton import Search
-from ..solvers.newton import Steps as Rules
+from ..solvers.newton import Search, Steps as Rules
 from ..solvers.outcome import StaticResult, LoadStepFailed
 from .solve import displacement
 
@@ -147,8 +146,7 @@ class Steps(Immutable):
             If a step is unknown, or if there is no value.
         """
         for name in values:
-            if name not in self.names:
-                raise NameUnknown("step", name, self.names)
+            require_option("step", name, self.names)
         if not values and start is None:
             raise InputError(f"ramp() has no values: give one at the end of a step, as ramp("
                              f"{self.names[0]}=1.0)")
@@ -205,8 +203,7 @@ class StepHistory(History):
         """Indices of the instants of a step, its start and end included."""
         if self.plan is None:
             raise InputError("the run had no named steps: scene.run(Steps(press=1, pull=1))")
-        if step not in self.plan.names:
-            raise NameUnknown("step", step, self.plan.names)
+        require_option("step", step, self.plan.names)
         k, ends = self.plan.names.index(step), np.append(0.0, self.plan.ends)
         slack = 1e-12 * ends[-1]
         return np.nonzero((self.t >= ends[k] - slack) & (self.t <= ends[k + 1] + slack))[0]

@@ -21,7 +21,7 @@ from ..beam.layout import WhichBeam, WhichMember, select_beam
 from ..beam.masses import projected
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, Interrupted, NameUnknown,
                     StrPath, ask, ask_field, refuse, require_finite, require_finite_scalar,
-                    require_function, require_label, require_positive, shown)
+                    require_function, require_label, require_option, require_positive, shown)
 from ..dynamics import Scheme, choose_scheme, get_scheme
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History
@@ -799,10 +799,8 @@ class Scene(Model):
         """Names and sensors, all or some of the scene or given as such."""
         found = dict(self._sensors) if names is None else dict[str, Sensor]()
         for one in names or ():
-            if not isinstance(one, Sensor) and one not in self._sensors:
-                raise NameUnknown("sensor", one, self._sensors)
             found.update({repr(one)[1:-1]: one} if isinstance(one, Sensor) else {
-                one: self._sensors[one]})
+                one: self._sensors[require_option("sensor", one, self._sensors)]})
         for sensor in found.values():
             locate(sensor, self.system)
         return list(found.items())

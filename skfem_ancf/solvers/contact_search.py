@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.contact.contacts import Contacts
-from ..actions.contact.contacts import FIRMER, YIELDS
+from ..actions.contact.contacts import FIRMER, YIELDS, Contacts
 from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
 from ..core import Array
 

@@ -20,11 +20,10 @@ from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of
                       of_pair, push, resist, states, untouched, way)
 from .laws import mean_pressure, pressure_slope
 from .poses import carried, taken_back
-from .tables import SEEN as SEEN_AT
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
                      POSE, POSES, PRESSURES, RADIUS, RATE, SETTLE, STIFFNESS, TANGENT, TOLERANCE,
-                     TURNS, ContactTables, Pair, Question, clear_table, pair_of, set_clear,
-                     transition, weights_of_motion)
+                     TURNS, ContactTables, Pair, Question, SEEN as SEEN_AT, clear_table, pair_of,
+                     set_clear, transition, weights_of_motion)
 
 
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is

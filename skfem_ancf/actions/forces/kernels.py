@@ -17,8 +17,8 @@ from ...core import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_products
 from ..contact.kernels import of_contacts, untouched
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SETTLE,
-                              TANGENT, TURNS, ContactTables, Question, is_clear)
-from ..contact.tables import RESISTING as RUBBING
+                              TANGENT, TURNS, ContactTables, Question, RESISTING as RUBBING,
+                              is_clear)
 
 #: Kinds of elements.
 SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))
