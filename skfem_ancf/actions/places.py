@@ -19,12 +19,10 @@ GROUND = "ground"
 
 
 class Vector:
-    """A plane vector that is affine in the degrees of freedom (DOFs).
-
-    It is ``start + sum(u[dofs] * weights, axis=1)``: the position of a material point, or the
-    direction of a section or a rigid body. ``dofs`` (2, n) are those of both components, None for a
-    constant; ``weights`` are (2, n), or (n,) for both.
-    """
+    """A plane vector that is affine in the degrees of freedom (DOFs). It is ``start + sum(u[dofs] *
+    weights, axis=1)``: the position of a material point, or the direction of a section or a rigid
+    body. ``dofs`` (2, n) are those of both components, None for a constant; ``weights`` are (2, n),
+    or (n,) for both."""
 
     def __init__(self, start: ArrayLike, dofs: Array | None = None,
                  weights: Any = 0.0) -> None:

@@ -37,13 +37,11 @@ class JointTables(NamedTuple):
 
 class LoadTables(NamedTuple):
     """The loads of a scene; a row of factors is the concatenation of those of all kinds.
-
     ``vectors`` are dead forces (k, N); ``rows, columns, values, which`` forces linear in the
     displacement and the numbers of their factors; ``eigenstrained`` beams with eigenstrains, and
     ``eigenstrains`` (k, n) for each such load its stresses or, for nonlinear laws, its strains, see
     :func:`~skfem_ancf.beam.strain_energy.eigenstrain_body_of`; ``custom`` is the handle of
-    user-defined loads.
-    """
+    user-defined loads."""
 
     vectors: F2
     moments: MomentPack

@@ -21,12 +21,10 @@ WhichMember: TypeAlias = Beam | RigidBody | Domain | str | int | None
 
 
 class Layout:
-    """Beams, rigid bodies and domains, their names, and the numbers of their DOFs.
-
-    Actions are bound to a Layout. The N DOFs are in the order of ``members``: beams, bodies,
-    domains. ``nodes`` are those of a frame, a :class:`~skfem_ancf.actions.joints.nodes.Nodes`.
-    Raises InputError if there are none, or if members or names are not unique.
-    """
+    """Beams, rigid bodies and domains, their names, and the numbers of their DOFs. Actions are
+    bound to a Layout. The N DOFs are in the order of ``members``: beams, bodies, domains. ``nodes``
+    are those of a frame, a :class:`~skfem_ancf.actions.joints.nodes.Nodes`. Raises InputError if
+    there are none, or if members or names are not unique."""
 
     nodes: Any = None
 

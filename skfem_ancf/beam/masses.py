@@ -20,13 +20,10 @@ TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 class Masses(NamedTuple):
-    """Masses at points of the elements, or of one element if all are equal.
-
-    ``functions`` are shape functions (nb, nelements, npoints), ``mass`` the masses, (nelements,
-    npoints). For cables, with velocity ``v + Y v_X`` turned by 90 degrees off
-    the axis, ``slopes`` are axial derivatives of the functions, and ``moments`` masses times Y and
-    Y^2, (2, nelements, npoints).
-    """
+    """Masses at points of the elements, or of one element if all are equal. ``functions`` are shape
+    functions (nb, nelements, npoints), ``mass`` the masses, (nelements, npoints). For cables, with
+    velocity ``v + Y v_X`` turned by 90 degrees off the axis, ``slopes`` are axial derivatives of
+    the functions, and ``moments`` masses times Y and Y^2, (2, nelements, npoints)."""
 
     functions: Array
     mass: Array

@@ -190,12 +190,9 @@ class Points:
     def find(self, points: Any, beam: WhichMember = None, line: int | None = None,
              ask: bool = False) -> Located:
         """Locate one or several points, see :func:`as_points`, or a RigidBody for its centre of
-        mass; where beams or lines overlap, in the one with the nearest axis.
-
-        ``line`` is the number of the line of a frame, or of the chain of elements of the beam. With
-        ``ask`` InputError if several axes are nearest, as at a node; MeshError if a point is in no
-        beam.
-        """
+        mass; where beams or lines overlap, in the one with the nearest axis. ``line`` is the number
+        of the line of a frame, or of the chain of elements of the beam. With ``ask`` InputError if
+        several axes are nearest, as at a node; MeshError if a point is in no beam."""
         if isinstance(points, Located):
             return points
         chain = None

@@ -143,12 +143,10 @@ def _sum(tables, x, at):
 
 def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
               across: Rule | None = None) -> Array:
-    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), shape (3, n).
-
-    ``u`` (N,) is the displacement, ``e`` (n,) are elements, ``X`` (2, n) points of the reference
-    cell. Each component is sampled and interpolated as ``term`` says, by default the first term of
-    the formulation. ``across``, points and weights, gives the mean over sections.
-    """
+    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), shape (3, n). ``u`` (N,) is the
+    displacement, ``e`` (n,) are elements, ``X`` (2, n) points of the reference cell. Each component
+    is sampled and interpolated as ``term`` says, by default the first term of the formulation.
+    ``across``, points and weights, gives the mean over sections."""
     if not beam.has_sections:
         longer, ratio = fibres(beam, e, X, *cable_axis(beam, u, e, X[0])[1:])
         xx = longer + 0.5 * longer * longer

@@ -70,11 +70,9 @@ class Band(NamedTuple):
 
 class BandMatrix(Band):
     """A square :class:`Band` that is assembled by element, multiplied, factorised and solved with.
-
     :meth:`factorize` leaves the entries: Cholesky factors, or pivoted LU of LAPACK for unsymmetric
     and indefinite matrices. :func:`factorize` of kernels replaces them, without pivots unless the
-    storage is that of ``gbtrf``; as ``factors`` they serve the matrix too.
-    """
+    storage is that of ``gbtrf``; as ``factors`` they serve the matrix too."""
 
     factors: Any = None  # an array of Cholesky's, or a Band
 
@@ -289,10 +287,9 @@ class BandMatrix(Band):
 
 class Coupling:
     """Sparse factors of a band matrix with entries anywhere beside it, while there are any.
-
     ``entries()`` returns rows, columns and values (k,) each; of a symmetric matrix of both halves.
-    ``band`` is the matrix, whose ``coupled`` are the handle of this and 1 while it has the factors.
-    """
+    ``band`` is the matrix, whose ``coupled`` are the handle of this and 1 while it has the
+    factors."""
 
     _lu: Any = None
 
@@ -464,12 +461,10 @@ def subtract_rows(J, x, out):
 
 @primitive("skfem_ancf.core.loops")
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
-    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``.
-
-    A is factorised; J and J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed
-    if ``anew``, S (m, m) is set to ``J1 Y^T``. b (m,) becomes the multipliers, x (n,) is reduced by
-    b Y. False if S is zero or not finite; redundant equations are allowed.
-    """
+    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``. A is factorised; J and
+    J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed if ``anew``, S (m, m)
+    is set to ``J1 Y^T``. b (m,) becomes the multipliers, x (n,) is reduced by b Y. False if S is
+    zero or not finite; redundant equations are allowed."""
     if anew:
         solve_many(A, J * free, Y)
     np.dot(J1, Y.T, out=S)

@@ -80,11 +80,9 @@ def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
 @lru_cache
 def _hermite_coefficients(m: int, derivative: int) -> Array:
     """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
-
     Bernstein coefficients times binomials, (2 m, n + 1 - derivative): without cancellation, as all
     have one sign (Farouki and Rajan, "On the numerical condition of polynomials in Bernstein form",
-    Computer Aided Geometric Design 4, 1987).
-    """
+    Computer Aided Geometric Design 4, 1987)."""
     n = 2 * m - 1
     left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]
             for k in range(m)]

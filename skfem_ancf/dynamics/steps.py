@@ -347,12 +347,10 @@ def _correct(e, matrices, rule, s, w, state, anew):
 
 @apart("motion", *ALL, float, float, returns=int)
 def _judged(e, matrices, rule, s, w, state, reference, noise):
-    """Update the independent stresses and decide what to do after the correction.
-
-    If old factors rotate with respect to a stiff, slender beam, they take axial stretch for
-    bending, and Newton's iteration needs new ones all the time. Independent stresses, ``S = D
-    (eps(u) + B(origin) du)``, have an error of the rotation only, whatever D is.
-    """
+    """Update the independent stresses and decide what to do after the correction. If old factors
+    rotate with respect to a stiff, slender beam, they take axial stretch for bending, and Newton's
+    iteration needs new ones all the time. Independent stresses, ``S = D (eps(u) + B(origin) du)``,
+    have an error of the rotation only, whatever D is."""
     du, scratch = w.x.du, w.x.scratch
     if state.mixed_steps[0] > 0:
         for i in indices(du.size):

@@ -236,12 +236,10 @@ def factorize_tangent(e, matrices, rule, s, w, state):
 
 @apart("unsymmetric", *ALL)
 def _unsymmetric_tangent(e, matrices, rule, s, w, state):
-    """Set U, the iteration matrix with the strain derivatives at the end of the step.
-
-    A mean force ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. A has B(u_m) instead of
-    B(u_1). They differ if more strains are sampled than the stretch of a straight axis can satisfy,
-    as in cables of degree 5 and above: then the iteration with A converges slowly or not at all.
-    """
+    """Set U, the iteration matrix with the strain derivatives at the end of the step. A mean force
+    ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. A has B(u_m) instead of B(u_1). They
+    differ if more strains are sampled than the stretch of a straight axis can satisfy, as in cables
+    of degree 5 and above: then the iteration with A converges slowly or not at all."""
     U = matrices.U
     copy(w.x.u, w.x.ahead)
     clear(U.flat)

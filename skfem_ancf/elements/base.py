@@ -19,13 +19,11 @@ from ..mesh.numbering import RefBeam
 # sampling points of the formulation "assumed", and the modes that they miss
 
 class Sampling(NamedTuple):
-    """Sampling of the strain along an element in the formulation "assumed".
-
-    ``points`` is the number of integration points (Gauss). ``samples`` maps a strain component
-    "xx", "yy" or "xy" to the points xi in [0, 1] where it is evaluated; others are evaluated at the
-    integration points. ``volume`` is the number of Gauss points for the volumetric part in plane
-    strain, reduced against volumetric locking; 0 to integrate it with the rest.
-    """
+    """Sampling of the strain along an element in the formulation "assumed". ``points`` is the
+    number of integration points (Gauss). ``samples`` maps a strain component "xx", "yy" or "xy" to
+    the points xi in [0, 1] where it is evaluated; others are evaluated at the integration points.
+    ``volume`` is the number of Gauss points for the volumetric part in plane strain, reduced
+    against volumetric locking; 0 to integrate it with the rest."""
 
     points: int
     samples: dict[str, tuple[float, ...]]
@@ -38,11 +36,9 @@ class Sampling(NamedTuple):
 
 class StabilisedMode(NamedTuple):
     """A mode that the samples miss, stabilised by ``1/2 k L |c|^2``, L the length of the element.
-
     ``weights`` (2 nodal_dofs,) give c, a derivative along X of a field, from the degrees of freedom
     of an element of length 1. ``size`` is k in units of E I over the squared length of the
-    "element" or the "beam", as ``per`` says; "" for a curvature c, without division.
-    """
+    "element" or the "beam", as ``per`` says; "" for a curvature c, without division."""
 
     weights: Array
     size: float

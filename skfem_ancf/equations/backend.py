@@ -59,13 +59,11 @@ _IS_LOADED = Choice("loaded", "compiled code is loaded")
 
 
 class Backend:
-    """Runs the kernels of a system.
-
-    The process counts its work in NumPy: iterations times elements and points of contact. As soon
-    as what is done and the next call reach the price, compiled code is taken, so the choice costs
-    at most twice the better one, however a user divides his work. The price of functions that are
-    loaded is 0, of cached ones :data:`LOADING`, of others a part of the time for compiling.
-    """
+    """Runs the kernels of a system. The process counts its work in NumPy: iterations times elements
+    and points of contact. As soon as what is done and the next call reach the price, compiled code
+    is taken, so the choice costs at most twice the better one, however a user divides his work. The
+    price of functions that are loaded is 0, of cached ones :data:`LOADING`, of others a part of the
+    time for compiling."""
 
     def __init__(self, system: Any) -> None:
         self.tables = Tables(system)

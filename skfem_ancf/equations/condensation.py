@@ -269,12 +269,10 @@ class CondensedMass:
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                    dm: Array) -> bool:
-        """Project velocities or accelerations R (N,) onto the joints at u and t.
-
-        ``phi`` (m,) is the required change of J R. ``du`` is the displacement of the joint forces
-        on entry; the change is returned in du (N,) and dm (m,). With empty ``multipliers`` a few
-        refinements suffice, since more iterations follow.
-        """
+        """Project velocities or accelerations R (N,) onto the joints at u and t. ``phi`` (m,) is
+        the required change of J R. ``du`` is the displacement of the joint forces on entry; the
+        change is returned in du (N,) and dm (m,). With empty ``multipliers`` a few refinements
+        suffice, since more iterations follow."""
         try:
             J = None
             if self.lag or not np.array_equal(du, u):
@@ -370,12 +368,10 @@ class _Basis:
 
 
 class _Part:
-    """A group's members with their inner DOFs eliminated.
-
-    ``bases`` are those of both sides; ``turns`` and ``moments`` (ends,) are their arguments;
-    ``hinged`` (M, 2) marks free rotations. The condensed matrices are stored in ``S``
-    (members, 6, 6). ``pivots`` (k,) belong to the eliminated rotations of hinged ends.
-    """
+    """A group's members with their inner DOFs eliminated. ``bases`` are those of both sides;
+    ``turns`` and ``moments`` (ends,) are their arguments; ``hinged`` (M, 2) marks free rotations.
+    The condensed matrices are stored in ``S`` (members, 6, 6). ``pivots`` (k,) belong to the
+    eliminated rotations of hinged ends."""
 
     def __init__(self, group: Group, K: BandMatrix, bases: Sequence[_Basis], turns: Array,
                  moments: Array, hinged: Array, S: Array) -> None:

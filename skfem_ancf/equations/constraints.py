@@ -29,14 +29,12 @@ _NO_ENTRIES = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
 
 class Constraints:
-    """The supports and joints of a scene.
-
-    Joints that only fix DOFs are eliminated like supports; the others, :attr:`joints`, are
-    equations ``Phi(u, t) = 0`` with m multipliers. Methods take a displacement u (N,), a time t and
-    multipliers (m,); sparse matrices are rows, columns and values (k,). ``free`` and ``mask`` (N,)
-    are bool and float; ``given`` are the displacements of the ``fixed`` DOFs at full load, without
-    motions of joints; ``stiffness()`` is that of force elements at rest, sparse (N, N), or None.
-    """
+    """The supports and joints of a scene. Joints that only fix DOFs are eliminated like supports;
+    the others, :attr:`joints`, are equations ``Phi(u, t) = 0`` with m multipliers. Methods take a
+    displacement u (N,), a time t and multipliers (m,); sparse matrices are rows, columns and values
+    (k,). ``free`` and ``mask`` (N,) are bool and float; ``given`` are the displacements of the
+    ``fixed`` DOFs at full load, without motions of joints; ``stiffness()`` is that of force
+    elements at rest, sparse (N, N), or None."""
 
     def __init__(self, members: Sequence[Beam | RigidBody], slices: Sequence[slice], size: float,
                  fixed: Array, values: Array, joints: Sequence[BoundConstraint],
@@ -393,11 +391,8 @@ class Constraints:
 
     def force_on(self, selected: Array, multipliers: Array, rest: Array) -> tuple[Array, Array]:
         """Support-like forces (N,), of constant joints of selected DOFs alone, and which DOFs they
-        have.
-
-        As the force of fixed DOFs, that of these joints balances the ``rest`` (N,) of all forces
-        that a scheme with the equations of motion inside of steps leaves at their end.
-        """
+        have. As the force of fixed DOFs, that of these joints balances the ``rest`` (N,) of all
+        forces that a scheme with the equations of motion inside of steps leaves at their end."""
         force, touched, zero = np.zeros(self.N), np.zeros(self.N, dtype=bool), np.zeros(self.N)
         found = []
         for joint, part in zip(self.joints, self.multipliers_of(multipliers)):

@@ -30,12 +30,10 @@ HELD = 1e-3
 
 
 def repeated(constraints: Any) -> tuple[Array | None, bool]:
-    """The redundant equations of joints, and whether they are dependent in this position only.
-
-    A redundant equation is closed, and a linear combination of others in J at the start and after a
+    """The redundant equations of joints, and whether they are dependent in this position only. A
+    redundant equation is closed, and a linear combination of others in J at the start and after a
     small random motion that the joints allow: a linkage in a singular position has such rows at the
-    start only. None involved may depend on time; None for dependent equations of another kind.
-    """
+    start only. None involved may depend on time; None for dependent equations of another kind."""
     c, found, passing = constraints, [], False
     start = np.zeros(c.N)
     start[c.fixed] = c.values(1.0)

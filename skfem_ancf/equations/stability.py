@@ -62,15 +62,12 @@ RUBS = "if points stick where they touch: friction has no potential, flutter is 
 
 def verdict(system: Any, u: Array, load: float, multipliers: Array,
             t: float | None = None) -> Verdict:
-    """The :class:`Verdict` on an equilibrium u (N,) with multipliers (m,).
-
-    Without a potential, as for a pressure with free edges, the tangent K is unsymmetric. det K < 0
-    (an odd number of negative eigenvalues) means divergence: unstable. A positive definite
-    symmetric part excludes it. Otherwise an eigenvalue with a negative real part, for equal masses
-    at the nodes, means unstable. All else is undecided, and flutter depends on the mass: see
-    ``scene.modes``. Points that slip on obstacles count as sticking: of a disturbance either way
-    friction resists one.
-    """
+    """The :class:`Verdict` on an equilibrium u (N,) with multipliers (m,). Without a potential, as
+    for a pressure with free edges, the tangent K is unsymmetric. det K < 0 (an odd number of
+    negative eigenvalues) means divergence: unstable. A positive definite symmetric part excludes
+    it. Otherwise an eigenvalue with a negative real part, for equal masses at the nodes, means
+    unstable. All else is undecided, and flutter depends on the mass: see ``scene.modes``. Points
+    that slip on obstacles count as sticking: of a disturbance either way friction resists one."""
     t = system.clock if t is None else t
     system = system.sticking()
     try:

@@ -112,11 +112,9 @@ class StrainTangent:
 
     def balance(self, M: csr_matrix, shift: float) -> None:
         """Replace the stress by one in equilibrium, if the state is an equilibrium to round-off.
-
         The axial stress of a slender beam has the round-off of the strain times E. The correction
         of the displacement is negligible, that of the stress is not. ``K + shift M`` must be
-        invertible.
-        """
+        invertible."""
         u, load, t, _ = self._at
         rest = (load * self.system.external_force(u, t)[self.free] - self.B.T @ self.stress
                 - self.J.T @ self.multipliers - self._element_force())
@@ -224,13 +222,10 @@ def load_stiffness(system: Any, u: Array, load: float, t: float | None = None) -
 
 
 class Inverse:
-    """Solves ``(K + shift M) x + J^T l = b``, ``J x = 0`` with iterative refinement by strains.
-
-    The factors are those of the assembled matrix. If the refinement does not converge, they are
-    those of the larger matrix with stresses as unknowns, which has the root of the condition
-    number. M is the sparse mass matrix of the free DOFs. Raises SupportError if the matrix is
-    singular.
-    """
+    """Solves ``(K + shift M) x + J^T l = b``, ``J x = 0`` with iterative refinement by strains. The
+    factors are those of the assembled matrix. If the refinement does not converge, they are those
+    of the larger matrix with stresses as unknowns, which has the root of the condition number. M is
+    the sparse mass matrix of the free DOFs. Raises SupportError if the matrix is singular."""
 
     def __init__(self, tangent: StrainTangent, M: Any = None, shift: float = 0.0) -> None:
         self._tangent, self._n = tangent, tangent.size[0]

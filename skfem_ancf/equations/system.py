@@ -436,10 +436,8 @@ class System:
     def assemble(self, u: Array, load: float = 1.0, independent: Array | None = None,
                  geometric: bool = True, t: float | None = None) -> tuple[Array, Array]:
         """The internal force (N,) and stresses (n,); the tangent of the residual is in :attr:`K`.
-
         Its geometric part, with the stiffness of follower loads, has the ``independent`` stresses
-        (see :meth:`linearised_stress`) if given; linear theory has none.
-        """
+        (see :meth:`linearised_stress`) if given; linear theory has none."""
         self._require_displacement(u)
         t = self.clock if t is None else t
         self.K.clear()

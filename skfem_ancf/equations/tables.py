@@ -99,13 +99,10 @@ class UserDefined:
             np.add.at(flat, at[keep], -scale * factor * v[keep])
 
     def add_custom_joints(self, what: int, t: float, u: Array, v: Array, out: Array) -> None:
-        """Evaluate joints.
-
-        ``what`` is 0: Phi, 1: J v, 2: J^T v with v (m,), 3: J, 4: v^T Phi'' v. For the
-        energy-momentum scheme, 5: the discrete gradient from v to u, 6: the force of impulses, with
-        u at the end of the step and v = (v0, v1, u0, impulses). 7 and 8 are 0 and 1 of the joints
-        that depend on time, with zeros for the others.
-        """
+        """Evaluate joints. ``what`` is 0: Phi, 1: J v, 2: J^T v with v (m,), 3: J, 4: v^T Phi'' v.
+        For the energy-momentum scheme, 5: the discrete gradient from v to u, 6: the force of
+        impulses, with u at the end of the step and v = (v0, v1, u0, impulses). 7 and 8 are 0 and 1
+        of the joints that depend on time, with zeros for the others."""
         c, N = self._system.constraints, self._system.N
         if what == 0:
             out[:] = c.constraint(u, t)

@@ -28,14 +28,12 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 
 
 class BodyFields(NamedTuple):
-    """The body of a state: ``meshio.Mesh(*fields)``.
-
-    ``points`` have the shape (n, 3). ``cells`` has for each beam its cell type and its cells, as
-    rows of point numbers; for each rigid body its outline; for each domain its triangles or quads.
-    ``point_data`` has fields by name, (n,), (n, 3) for vectors, with a third component of zero, and
-    (n, 6) for symmetric tensors (xx, yy, zz, xy, yz, xz). ``cell_data`` has the numbers ``beam``
-    and ``element``, one array for each beam, ``field_data`` global data.
-    """
+    """The body of a state: ``meshio.Mesh(*fields)``. ``points`` have the shape (n, 3). ``cells``
+    has for each beam its cell type and its cells, as rows of point numbers; for each rigid body its
+    outline; for each domain its triangles or quads. ``point_data`` has fields by name, (n,), (n, 3)
+    for vectors, with a third component of zero, and (n, 6) for symmetric tensors (xx, yy, zz, xy,
+    yz, xz). ``cell_data`` has the numbers ``beam`` and ``element``, one array for each beam,
+    ``field_data`` global data."""
 
     points: np.ndarray
     cells: list

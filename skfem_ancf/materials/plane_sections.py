@@ -15,13 +15,10 @@ THICKNESS = 1e4
 
 @source
 def plane_sections(constants, xx, yy, xy):
-    """W = E/2 (a - 1)^2 + G/2 g^2 + K/2 eps_yy^2 and its derivatives.
-
-    With the axial derivative f of the position and the unit vector n along the section, a is the
-    part of f normal to n, and g = f . n. In terms of the strain g^2 = (2 eps_xy)^2 / C_22 and
-    a^2 = C_11 - g^2. Arguments are those of
-    :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial`.
-    """
+    """W = E/2 (a - 1)^2 + G/2 g^2 + K/2 eps_yy^2 and its derivatives. With the axial derivative f
+    of the position and the unit vector n along the section, a is the part of f normal to n, and g =
+    f . n. In terms of the strain g^2 = (2 eps_xy)^2 / C_22 and a^2 = C_11 - g^2. Arguments are
+    those of :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial`."""
     E, G, K = constants[0], constants[1], constants[2]
     across = 1.0 / (1.0 + 2.0 * yy)
     slide = across * xy  # half the derivative of g^2 by 2 eps_xy
@@ -39,13 +36,11 @@ def plane_sections(constants, xx, yy, xy):
 
 class PlaneSections(PointwiseMaterial):
     """The geometrically exact beam of one point of its section (Reissner: "On one-dimensional
-    finite-strain beam theory: the plane problem", Z. angew. Math. Phys. 23 (1972); Simo).
-
-    The axial stress is E times the stretch normal to the section minus one, the shear stress is
-    ``shear`` times the derivative of the position within the section. Both are linear in the
-    strains of Reissner's beam for sections that stay plane and keep their size, which a large
-    stiffness holds: with a curvature kappa its change is ``EI kappa^2 / (1e4 EA)``.
-    """
+    finite-strain beam theory: the plane problem", Z. angew. Math. Phys. 23 (1972); Simo). The axial
+    stress is E times the stretch normal to the section minus one, the shear stress is ``shear``
+    times the derivative of the position within the section. Both are linear in the strains of
+    Reissner's beam for sections that stay plane and keep their size, which a large stiffness holds:
+    with a curvature kappa its change is ``EI kappa^2 / (1e4 EA)``."""
 
     point = staticmethod(plane_sections)
     #: Hooke's law for the small strains of a cable.

@@ -140,13 +140,11 @@ PLACES = ("the name of nodes, the number of a node, a point as a tuple (x, y), a
 
 
 class FrameGraph:
-    """The graph of a frame: points, lines between them, and names for both.
-
-    Arguments are those of :meth:`skfem_ancf.Frame.from_lines`; ``beams`` names the groups that are
-    beams, ``lost`` points of a mesh that are not in the graph. ``points`` (2, n) that are merged
-    have the same position, and ``lines`` (2, m) refer to the first of them, ``same`` (n,);
-    ``given`` are lines as given, ``distinct`` those between distinct nodes.
-    """
+    """The graph of a frame: points, lines between them, and names for both. Arguments are those of
+    :meth:`skfem_ancf.Frame.from_lines`; ``beams`` names the groups that are beams, ``lost`` points
+    of a mesh that are not in the graph. ``points`` (2, n) that are merged have the same position,
+    and ``lines`` (2, m) refer to the first of them, ``same`` (n,); ``given`` are lines as given,
+    ``distinct`` those between distinct nodes."""
 
     def __init__(self, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
                  nodes: Mapping[str, Any] | None = None,

@@ -20,12 +20,10 @@ from .places import satisfying
 
 
 class RefBeam(Refdom):
-    """Unit square (xi, eta) with two vertices, at the middle of its left and right side.
-
-    ``xi`` runs along the axis, ``eta`` across the section; the axis is ``eta = 1/2``. The facets
-    are bottom, right, top, left as in scikit-fem's ``RefQuad``, whose quadrature is used (attribute
-    ``refdom``). Bottom and top share their two vertices; left and right have one, listed twice.
-    """
+    """Unit square (xi, eta) with two vertices, at the middle of its left and right side. ``xi``
+    runs along the axis, ``eta`` across the section; the axis is ``eta = 1/2``. The facets are
+    bottom, right, top, left as in scikit-fem's ``RefQuad``, whose quadrature is used (attribute
+    ``refdom``). Bottom and top share their two vertices; left and right have one, listed twice."""
 
     p = np.array([[0.0, 1.0], [0.5, 0.5]])
     t = np.array([[0], [1]], dtype=np.int32)

@@ -71,11 +71,9 @@ INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 
 class SectionsAlong:
     """Operators on values at n >= 3 sections of arc lengths s (n,), for values (..., n, m).
-
     Derivative and integral are those of the cubic spline through the values, whose third derivative
     is continuous at the second section and at the last but one (de Boor, "A Practical Guide to
-    Splines", chapter 4); of the parabola through three values.
-    """
+    Splines", chapter 4); of the parabola through three values."""
 
     def __init__(self, s: Array, smoothing: float) -> None:
         self.d = d = np.diff(s)

@@ -257,15 +257,12 @@ class Sections:
 
 
 class SectionForces:
-    """Section forces of a beam for a displacement ``u`` (N,).
-
-    Between ``cuts``, axial coordinates element + xi, they are continuous. For a linear solution
-    ``u``, the load factors and the results are complex steps
-    (:func:`~skfem_ancf.core.linear.step`). ``loads`` are pairs of a factor and a Distribution (or
-    None), ``stations`` the axial coordinates of supports and joints, ``sampled`` further force
-    densities, ``viscous`` the viscous element forces (ne, nb, 2); ``pressed`` is True if obstacles
-    touch the beam. Raises NotRecovered if the state is not an equilibrium.
-    """
+    """Section forces of a beam for a displacement ``u`` (N,). Between ``cuts``, axial coordinates
+    element + xi, they are continuous. For a linear solution ``u``, the load factors and the results
+    are complex steps (:func:`~skfem_ancf.core.linear.step`). ``loads`` are pairs of a factor and a
+    Distribution (or None), ``stations`` the axial coordinates of supports and joints, ``sampled``
+    further force densities, ``viscous`` the viscous element forces (ne, nb, 2); ``pressed`` is True
+    if obstacles touch the beam. Raises NotRecovered if the state is not an equilibrium."""
 
     def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
                  stations: Sequence[float] = (), acceleration: Array | None = None,

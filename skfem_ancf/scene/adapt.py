@@ -170,14 +170,12 @@ def _changed(scene, marked, elements):
 
 
 def frequency_errors(scene: Any, modes: Modes) -> Array:
-    """Relative errors (k,) of frequencies at rest by the mesh of the beams; NaN if not known.
-
-    They are the change as all elements are halved, times 4/3: the sum of all further changes for
+    """Relative errors (k,) of frequencies at rest by the mesh of the beams; NaN if not known. They
+    are the change as all elements are halved, times 4/3: the sum of all further changes for
     elements of second order, a quarter too large for those of fourth order. The shapes are improved
     on the halved elements by two steps of subspace iteration (Xu, Zhou: "A two-grid discretization
     scheme for eigenvalue problems", Mathematics of Computation 70 (2001)). A ModelWarning says
-    where errors are large.
-    """
+    where errors are large."""
     nothing = np.full(len(modes.frequencies), np.nan)
     if scene.layout.N > MOST_HALVED or not scene.beams or np.iscomplexobj(modes.shapes):
         return nothing

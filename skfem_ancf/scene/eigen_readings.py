@@ -40,10 +40,9 @@ def residual(system: Any, u: Array, multipliers: Array, load: float, memory: Any
 
 class Frozen(NamedTuple):
     """The derivatives of an eigenvalue: by parameters that of the sum of ``rows`` of a scene.
-
     ``by_state`` (N + m,) is that by the displacements and multipliers of the static solution, or
-    None. ``check`` is a function of the sum of the second half of the rows of each parameter, (n,).
-    """
+    None. ``check`` is a function of the sum of the second half of the rows of each parameter,
+    (n,)."""
 
     rows: Any
     by_state: Array | None = None

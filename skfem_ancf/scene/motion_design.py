@@ -261,12 +261,10 @@ class MotionDesign(Design):
 
 
 class _Step:
-    """The equations of a step, or of the start, and their linearisation.
-
-    Unknowns and equations are in the order u, l; v, impulses; a, forces: the motion with l, what
-    joints make of the velocity of the scheme, and of its acceleration. At the start the first are
-    those of the static solution, or nothing.
-    """
+    """The equations of a step, or of the start, and their linearisation. Unknowns and equations are
+    in the order u, l; v, impulses; a, forces: the motion with l, what joints make of the velocity
+    of the scheme, and of its acceleration. At the start the first are those of the static solution,
+    or nothing."""
 
     def __init__(self, design: MotionDesign, y: Motion, before: Motion | None) -> None:
         system = self._system = design._built.system
@@ -493,9 +491,7 @@ class _MeanStep(_Step):
 
 def _factors(rows, K, c, h):
     """The factors of equations and unknowns in blocks u, l; v, impulses; a, forces, or the first.
-
-    They are scaled by the sizes of coordinates, a stiffness K and the time h.
-    """
+    They are scaled by the sizes of coordinates, a stiffness K and the time h."""
     sizes, n = c.coordinate_sizes, len(rows)
     scale = np.full(c.m, np.abs(K.diagonal() * sizes**2)[c.free].max())
     both = [sizes, scale, sizes / h]

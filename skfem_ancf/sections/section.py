@@ -126,13 +126,11 @@ WHOLE = Uniform()
 
 
 class Weighted(Measure):
-    """Width that varies across: Gauss rules of the measure b(Y) dY.
-
-    They are exact, to round-off, for polynomials of degree 2 n - 1 times the width, jumps and
-    square roots at the ends of circles included. The measure is discretised interval by interval
-    with ``Y = middle - half cos t`` and Gauss points in t (Gautschi: "Orthogonal Polynomials:
-    Computation and Approximation", Oxford University Press, 2004).
-    """
+    """Width that varies across: Gauss rules of the measure b(Y) dY. They are exact, to round-off,
+    for polynomials of degree 2 n - 1 times the width, jumps and square roots at the ends of circles
+    included. The measure is discretised interval by interval with ``Y = middle - half cos t`` and
+    Gauss points in t (Gautschi: "Orthogonal Polynomials: Computation and Approximation", Oxford
+    University Press, 2004)."""
 
     def __init__(self, pieces: Sequence[Piece]) -> None:
         self.pieces = tuple(pieces)
@@ -172,11 +170,9 @@ LEAST, ROUND = 8, 40
 
 class Moving(Measure):
     """Width with interval ends ``a + b / h``: constant thicknesses on a varying height.
-
     Formulations sample strains at constant relative heights, so the points eta are the same along
     the beam and the weights vary: Gauss weights times the Legendre series of the width, which
-    reproduces its moments up to ``degree``. Single weights may be negative.
-    """
+    reproduces its moments up to ``degree``. Single weights may be negative."""
 
     low, high, moves = 0.0, 1.0, True
 

@@ -107,13 +107,11 @@ def search_contact(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
                    respond: Callable[..., Any], failed: type[Exception],
                    close: bool = False, dragged: bool = False) -> Any:
-    """An equilibrium in contact at the time t, from a displacement and its time.
-
-    Obstacles have the contact history at the start of the load step. ``solve`` takes the last
-    equilibrium (None for the start), whether a rough one suffices, and the number of iterations; it
-    raises ``failed``. ``respond`` is that of ``contacts.yielding`` at an equilibrium. If the start
-    is ``close`` to the equilibrium, few iterations are tried.
-    """
+    """An equilibrium in contact at the time t, from a displacement and its time. Obstacles have the
+    contact history at the start of the load step. ``solve`` takes the last equilibrium (None for
+    the start), whether a rough one suffices, and the number of iterations; it raises ``failed``.
+    ``respond`` is that of ``contacts.yielding`` at an equilibrium. If the start is ``close`` to the
+    equilibrium, few iterations are tried."""
     memory, before = contacts.tables.memory, contacts.tables.memory.copy()
     ramp = StiffnessRamp(contacts, start, t, solve, energy, respond, failed)
 

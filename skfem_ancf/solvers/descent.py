@@ -81,15 +81,12 @@ def near_limit(system: System, start: StaticResult) -> bool:
 
 
 class Descent:
-    """A trust-region method that minimises the potential.
-
-    A multiple of the identity (in scaled DOFs) is added to the tangent until it is positive
-    definite and the correction is within a radius (Levenberg-Marquardt; Conn, Gould, Toint:
-    Trust-Region Methods (2000), 7.3), which starts as ``radius``, the largest change of a scaled
-    DOF. It is halved if corrections reverse, and grows to five times that if they continue. Close
-    to a minimum nothing is added: Newton's method. ``saw_unstable`` is True once a direction of
-    negative curvature was met.
-    """
+    """A trust-region method that minimises the potential. A multiple of the identity (in scaled
+    DOFs) is added to the tangent until it is positive definite and the correction is within a
+    radius (Levenberg-Marquardt; Conn, Gould, Toint: Trust-Region Methods (2000), 7.3), which starts
+    as ``radius``, the largest change of a scaled DOF. It is halved if corrections reverse, and
+    grows to five times that if they continue. Close to a minimum nothing is added: Newton's method.
+    ``saw_unstable`` is True once a direction of negative curvature was met."""
 
     def __init__(self, system: System, radius: float = RADII[0]) -> None:
         self.system, self.saw_unstable, self.handle = system, False, handle_of(self)

@@ -33,14 +33,12 @@ REAL = 1e-7  # relative imaginary part of a real eigenvalue
 
 
 def modes(system: System, state: State, k: int) -> Modes:
-    """The k lowest natural frequencies about a state (smallest real part of ``lambda``).
-
-    The eigenvalues of ``K x = lambda M x`` are the largest of ``(K + s M)^-1 M`` with a small shift
-    s. Solutions are refined by strains, and eigenvalues are quotients of sums of squared strains:
-    low (bending) frequencies are accurate although the highest eigenvalues are ``(L / h)^4`` times
+    """The k lowest natural frequencies about a state (smallest real part of ``lambda``). The
+    eigenvalues of ``K x = lambda M x`` are the largest of ``(K + s M)^-1 M`` with a small shift s.
+    Solutions are refined by strains, and eigenvalues are quotients of sums of squared strains: low
+    (bending) frequencies are accurate although the highest eigenvalues are ``(L / h)^4`` times
     larger. Without a potential they may be complex. Points that touch with friction stick, also if
-    they slip.
-    """
+    they slip."""
     system = system.after(state.memory).sticking()
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
     if tangent.size[0] <= DENSE:
@@ -244,14 +242,12 @@ def _unsymmetric(tangent, M, k, shift, small):
 
 
 def buckling(system: System, k: int, state: State | None = None) -> Buckling:
-    """The k lowest positive load factors of linear buckling.
-
-    ``(K_0 + factor K_s) phi = 0``, with the geometric stiffness K_s of the linear stress under full
-    load, including support displacements and load stiffness. Factors with a prebuckling strain of
-    order one are omitted; without a potential, only real factors (divergence) are found. With a
-    state, whose loads are constant, K_0 is its tangent; otherwise that of the state without loads,
-    in which prestressed springs and energies that are not scaled may push.
-    """
+    """The k lowest positive load factors of linear buckling. ``(K_0 + factor K_s) phi = 0``, with
+    the geometric stiffness K_s of the linear stress under full load, including support
+    displacements and load stiffness. Factors with a prebuckling strain of order one are omitted;
+    without a potential, only real factors (divergence) are found. With a state, whose loads are
+    constant, K_0 is its tangent; otherwise that of the state without loads, in which prestressed
+    springs and energies that are not scaled may push."""
     system.constraints.require_supports()
     state = state or _prestressed(system)
     system = system.after(system.histories.of_state(state))

@@ -32,12 +32,10 @@ NEAR = 1e-2
 
 
 class Route(NamedTuple):
-    """How loads and supports change with the level from 0 to 1.
-
-    ``u`` (N,) is the displacement at level 0. With ``gap`` (N,), the residual there under full load
-    is reduced to zero; otherwise ``loads`` and ``times`` are the load factor, and the time of
-    supports and obstacles, at both levels. ``span`` is the time that passes for materials.
-    """
+    """How loads and supports change with the level from 0 to 1. ``u`` (N,) is the displacement at
+    level 0. With ``gap`` (N,), the residual there under full load is reduced to zero; otherwise
+    ``loads`` and ``times`` are the load factor, and the time of supports and obstacles, at both
+    levels. ``span`` is the time that passes for materials."""
 
     u: Array
     gap: Array | None = None
@@ -60,11 +58,9 @@ class Route(NamedTuple):
 
 class Options(NamedTuple):
     """Options of an iteration: method "mixed" or "newton", tolerance, largest number of iterations.
-
     If ``watched``, the iteration stops where the mixed method does not seem to converge. ``close``:
     the start is close to the equilibrium. ``drag`` (N,) is a force on each DOF per displacement in
-    the increment, and ``guess`` (N,) a first displacement.
-    """
+    the increment, and ``guess`` (N,) a first displacement."""
 
     route: Route
     method: str
@@ -129,12 +125,10 @@ class Increment:
             "multipliers": found.multipliers, "force": found.force, "seen": found.seen})
 
     def _augmented(self):
-        """Repeat with corrected pressures until the penetration is within tolerance.
-
-        Where the body alone is unstable, as a buckled strip at a wall, corrections converge only if
-        obstacles are stiffer than it is unstable, see Bertsekas: "Constrained Optimization and
-        Lagrange Multiplier Methods", Academic Press 1982, 2.2.
-        """
+        """Repeat with corrected pressures until the penetration is within tolerance. Where the body
+        alone is unstable, as a buckled strip at a wall, corrections converge only if obstacles are
+        stiffer than it is unstable, see Bertsekas: "Constrained Optimization and Lagrange
+        Multiplier Methods", Academic Press 1982, 2.2."""
         contacts = self.system.forces.contacts
         found = self._touching()
         for _ in range(AUGMENTED):
@@ -200,11 +194,9 @@ class Increment:
     def iterate(self, begin: Any = None, options: Options | None = None, solver: Any = None,
                 backend: Any = None, by_third: bool = False) -> Equilibrium:
         """Iterate to equilibrium from ``begin``, by default the last one; raises LoadStepFailed.
-
         ``solver`` solves the linear systems, such as a
         :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws;
-        ``by_third`` stops if the third correction is not smaller than the first.
-        """
+        ``by_third`` stops if the third correction is not smaller than the first."""
         system, options = self.system, options or self.options
         u = self.start.u if options.guess is None else options.guess
         u, multipliers = (begin or (u, self.start.multipliers))[:2]

@@ -123,14 +123,12 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
 
 
 class Search:
-    """The search for an equilibrium: initial state, options, and its strategies.
-
-    ``u`` (N,) and ``memory`` (n,) are initial displacement and history, or None; ``rules`` the
-    options of load steps; ``span`` the time that passes for materials. ``stabilised_by_loads`` is
-    True if the supports leave a rigid motion free, so that only loads or obstacles stabilise the
-    scene; ``touches`` if there are obstacles, or members that may touch. ``attempts`` lists the
-    strategies tried.
-    """
+    """The search for an equilibrium: initial state, options, and its strategies. ``u`` (N,) and
+    ``memory`` (n,) are initial displacement and history, or None; ``rules`` the options of load
+    steps; ``span`` the time that passes for materials. ``stabilised_by_loads`` is True if the
+    supports leave a rigid motion free, so that only loads or obstacles stabilise the scene;
+    ``touches`` if there are obstacles, or members that may touch. ``attempts`` lists the strategies
+    tried."""
 
     def __init__(self, system: System, u: Array | None, memory: Array | None, rules: Steps,
                  stable: bool, progress: bool | None, span: float = 0.0) -> None:

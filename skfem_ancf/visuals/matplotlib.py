@@ -405,8 +405,7 @@ def colormap(cmap: Any) -> Any:
 def page(ax: Any, title: str | None, filename: Any, dpi: float, **options: Any,
          ) -> Callable[[Any], None]:
     """Check the file, or None, and its resolution, before anything is drawn; returns what writes
-    the figure of some Axes.
-    """
+    the figure of some Axes."""
     figure_class()
     from matplotlib.backend_bases import FigureCanvasBase
 

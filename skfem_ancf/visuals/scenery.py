@@ -159,12 +159,10 @@ def _default(states):
 
 
 class Scenery:
-    """States of the same beams with one thickness factor and one range of colours.
-
-    Arguments are those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and
-    ``rigid`` are for each state its beams and domains, and the grids of its rigid bodies and of
-    domains without the field; ``found`` (n,) the values of all coloured points.
-    """
+    """States of the same beams with one thickness factor and one range of colours. Arguments are
+    those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and ``rigid`` are for
+    each state its beams and domains, and the grids of its rigid bodies and of domains without the
+    field; ``found`` (n,) the values of all coloured points."""
 
     #: How far around the bodies obstacles are drawn.
     margin = AROUND

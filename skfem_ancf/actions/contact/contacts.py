@@ -80,14 +80,12 @@ class Group(NamedTuple):
 
 
 class Contacts:
-    """The obstacles of a scene: its force elements with ``groups``.
-
-    Positions are relative to ``origin``, the middle of the bodies, to reduce round-off in friction.
-    Arguments are displacements and velocities ``u, v``, (N,), and the time ``t``, in statics the
-    load factor. ``groups`` are pairs of an obstacle's number and a :class:`Group`. An obstacle may
-    be ``moving``, ``custom`` (a user-defined shape), ``anchored`` (friction), ``augmented``;
-    ``keeps`` if there are history data, with the angles of torsional springs, ``springs`` (k, n).
-    """
+    """The obstacles of a scene: its force elements with ``groups``. Positions are relative to
+    ``origin``, the middle of the bodies, to reduce round-off in friction. Arguments are
+    displacements and velocities ``u, v``, (N,), and the time ``t``, in statics the load factor.
+    ``groups`` are pairs of an obstacle's number and a :class:`Group`. An obstacle may be
+    ``moving``, ``custom`` (a user-defined shape), ``anchored`` (friction), ``augmented``; ``keeps``
+    if there are history data, with the angles of torsional springs, ``springs`` (k, n)."""
 
     def __init__(self, elements: Sequence[Any], N: int, springs: Sequence[Array] = ()) -> None:
         self.obstacles = [element for element in elements if element.groups]
@@ -261,13 +259,11 @@ class Contacts:
                 push * mean_pressure(a, a, width))
 
     def yielding(self, u: Array, t: float, respond: Callable[..., Any]) -> Array:
-        """The relative error of the answer by the penetration, shape (groups,), to first order.
-
-        For obstacles of default stiffness that the ends of a beam or a stout body touch: that of
-        their forces, or of the largest displacement. A slender beam yields more in bending.
-        ``respond`` returns changes of displacements (N,) for forces (N,), from the tangent, and a
-        measure of displacements; None without a tangent.
-        """
+        """The relative error of the answer by the penetration, shape (groups,), to first order. For
+        obstacles of default stiffness that the ends of a beam or a stout body touch: that of their
+        forces, or of the largest displacement. A slender beam yields more in bending. ``respond``
+        returns changes of displacements (N,) for forces (N,), from the tangent, and a measure of
+        displacements; None without a tangent."""
         out = np.zeros(len(self.groups))
         for k, ((_, group), _, gap) in enumerate(self.look(u, t)):
             if group.firmest <= 1.0 or not np.any(gap < 0.0):

@@ -136,12 +136,10 @@ def disc(shape, whole, y, out):
 
 @apart("contacts", F1, bool, F2, F2)
 def outline(shape, whole, y, out):
-    """Closest point projection on a polygon with rounded corners.
-
-    Parameters of the shape: radius of the corners, relative ends of the edges, then for each
-    corner: position, vector to the next one, 1 or -1 for convex or not. The surface is a line near
-    an edge, a circle near a corner. A circle alone has five parameters, see :func:`disc`.
-    """
+    """Closest point projection on a polygon with rounded corners. Parameters of the shape: radius
+    of the corners, relative ends of the edges, then for each corner: position, vector to the next
+    one, 1 or -1 for convex or not. The surface is a line near an edge, a circle near a corner. A
+    circle alone has five parameters, see :func:`disc`."""
     if shape.size == DISC:
         disc(shape, whole, y, out)
         return

@@ -67,14 +67,12 @@ class Question(NamedTuple):
 
 
 class ContactTables(NamedTuple):
-    """The obstacles of a scene, as ``number`` pairs.
-
-    ``ints`` and ``floats`` are headers of pairs, DOFs, and parameters of points and shapes;
-    ``poses`` those of obstacles at the last time; ``memory`` history data. ``moving`` tells whether
-    poses depend on time, ``custom`` is the handle for poses and user-defined shapes, ``lasting``
-    the sum of flags of history data: ANCHORS, TURNS, PRESSURES. ``clear`` says where nothing
-    touches, see :func:`is_clear`; it is empty if obstacles move, or have multipliers.
-    """
+    """The obstacles of a scene, as ``number`` pairs. ``ints`` and ``floats`` are headers of pairs,
+    DOFs, and parameters of points and shapes; ``poses`` those of obstacles at the last time;
+    ``memory`` history data. ``moving`` tells whether poses depend on time, ``custom`` is the handle
+    for poses and user-defined shapes, ``lasting`` the sum of flags of history data: ANCHORS, TURNS,
+    PRESSURES. ``clear`` says where nothing touches, see :func:`is_clear`; it is empty if obstacles
+    move, or have multipliers."""
 
     number: int
     ints: I1
@@ -88,13 +86,11 @@ class ContactTables(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """The surface of one beam with one obstacle: views of :class:`ContactTables`.
-
-    ``first`` is the first degree of freedom of each point's element, (n,); ``weights`` and
-    ``slopes`` those of pairs of degrees of freedom in its position and slope, (pairs, n);
-    ``middles`` positions and weights of element middles; the parameters end with those of the
-    shape. ``common`` is the history data shared by all pairs.
-    """
+    """The surface of one beam with one obstacle: views of :class:`ContactTables`. ``first`` is the
+    first degree of freedom of each point's element, (n,); ``weights`` and ``slopes`` those of pairs
+    of degrees of freedom in its position and slope, (pairs, n); ``middles`` positions and weights
+    of element middles; the parameters end with those of the shape. ``common`` is the history data
+    shared by all pairs."""
 
     k: int
     number: int

@@ -173,12 +173,10 @@ def _along_elements(group):
 
 
 def _balanced(group, pressure):
-    """The nodal pressure (n,) in equilibrium with the forces of points; zero at free points.
-
-    The nodal force over the area of its shape function (lumped) on the contact surface; free points
+    """The nodal pressure (n,) in equilibrium with the forces of points; zero at free points. The
+    nodal force over the area of its shape function (lumped) on the contact surface; free points
     between two in contact count if these are less than an element apart. The positions of both
-    nodes have the functions number 0 and half; each side of the beam is separate.
-    """
+    nodes have the functions number 0 and half; each side of the beam is separate."""
     from scipy.ndimage import binary_closing  # its import takes as long as a solution
 
     n, m, half = group.elements, group.points, len(group.weights) // 2

@@ -25,13 +25,11 @@ EDGE, PARTS = 4, 50
 
 class Facets(NamedTuple):
     """Facets (F,) with B pairs of degrees of freedom each, and points of the surface (P,).
-
     ``members``, ``chains`` and ``curves`` are numbers of their members, of the chains of these, and
     of smooth parts of their surfaces; ``places`` and ``lengths`` where facets begin along these and
     how long they are, ``spans`` that along an axis. ``heights`` is how thick the member is,
     ``firmness`` its pressure per penetration, infinite if not known. Points have a facet, ``zeta``,
-    and an area, per width for bodies and domains.
-    """
+    and an area, per width for bodies and domains."""
 
     dofs: Array  # (F, B)
     weights: Array  # coefficients of powers of zeta, (F, B, n)

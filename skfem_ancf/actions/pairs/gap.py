@@ -147,12 +147,10 @@ def gaps(pairs: Pairs, z: Array) -> Array:
 
 def mean_slope(pairs: Pairs, z0: Array, z1: Array) -> Array:
     """Mean derivative (n, 2 B) of the gap between two states: its product with the change of the
-    degrees of freedom is the change of the gap.
-
-    The gap is a function of the products of r - c, t and T, which do not change with rigid motions:
-    differences of products are exact with means of the factors, so a force along the mean
-    derivative keeps both momenta. For equal states it is the derivative.
-    """
+    degrees of freedom is the change of the gap. The gap is a function of the products of r - c, t
+    and T, which do not change with rigid motions: differences of products are exact with means of
+    the factors, so a force along the mean derivative keeps both momenta. For equal states it is the
+    derivative."""
     (r0, t0, c0, T0), (r1, t1, c1, T1) = pairs.vectors(z0), pairs.vectors(z1)
     rho0, rho1, side, s = r0 - c0, r1 - c1, pairs.side, pairs.shift
     rho, t, T = 0.5 * (rho0 + rho1), 0.5 * (t0 + t1), 0.5 * (T0 + T1)

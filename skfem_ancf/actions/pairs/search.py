@@ -58,12 +58,10 @@ class Touching(NamedTuple):
 
 
 class Search:
-    """Finds the facet that each point is nearest to.
-
-    ``allowed`` (M, M) says which members may touch; ``begins`` (P,) is the gap at which the
-    pressure begins. ``solids`` are numbers of members without axes, and functions that say which
-    places of the reference configuration are inside.
-    """
+    """Finds the facet that each point is nearest to. ``allowed`` (M, M) says which members may
+    touch; ``begins`` (P,) is the gap at which the pressure begins. ``solids`` are numbers of
+    members without axes, and functions that say which places of the reference configuration are
+    inside."""
 
     def __init__(self, surfaces: Surfaces, allowed: Array, solids: Sequence[Any] = ()) -> None:
         self.surfaces, self.allowed, self.begins = surfaces, allowed, np.inf

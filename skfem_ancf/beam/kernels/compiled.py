@@ -51,12 +51,10 @@ def compiled_pattern(pattern: Pattern) -> CompiledPattern:
 
 
 class CompiledTables(NamedTuple):
-    """The StrainTables for compiled kernels; n = 1 if all blocks of elements are equal.
-
-    m is the number of functions G, np that of products of rows in tangents. Vectors (2 W) have the
+    """The StrainTables for compiled kernels; n = 1 if all blocks of elements are equal. m is the
+    number of functions G, np that of products of rows in tangents. Vectors (2 W) have the
     components x of all elements, then y. K are lower halves of symmetric matrices (m, m), for xx,
-    yy and the symmetric part of xy; Z those of the skew part of xy, without diagonal.
-    """
+    yy and the symmetric part of xy; Z those of the skew part of xy, without diagonal."""
 
     pattern: CompiledPattern
     kind: int  # SECTION or CABLE

@@ -55,12 +55,10 @@ SAME = 1e-12
 
 
 class ElementsWithHistory(Elements):
-    """Elements of a :class:`~skfem_ancf.materials.HistoryMaterial`.
-
-    ``history`` (k, points, ne) is that at the start of an increment, ``span`` (1,) its time;
-    ``before`` and ``now`` (c, points, ne) are the eigenstrains at its start and end. The law has
-    the strain minus these. Cables have fibres: their points have one strain, along the axis.
-    """
+    """Elements of a :class:`~skfem_ancf.materials.HistoryMaterial`. ``history`` (k, points, ne) is
+    that at the start of an increment, ``span`` (1,) its time; ``before`` and ``now`` (c, points,
+    ne) are the eigenstrains at its start and end. The law has the strain minus these. Cables have
+    fibres: their points have one strain, along the axis."""
 
     def __init__(self, t: StrainTables) -> None:
         super().__init__(t)

@@ -22,13 +22,11 @@ TOGETHER = 4096
 
 
 class ElementKernel:
-    """Base class of the kernels of one beam.
-
-    Displacements u are (N,), element forces (ne, nb, 2), weighted stresses (ne, ns) for each of
-    :attr:`tables`, the :class:`~skfem_ancf.beam.kernels.tables.StrainTables` of the terms of the
-    strain energy. ``constant`` is the stabilisation, (ne, 2 nb, 2 nb) or (1, ...), or None;
-    ``points_number`` the number of integration points of an element.
-    """
+    """Base class of the kernels of one beam. Displacements u are (N,), element forces (ne, nb, 2),
+    weighted stresses (ne, ns) for each of :attr:`tables`, the
+    :class:`~skfem_ancf.beam.kernels.tables.StrainTables` of the terms of the strain energy.
+    ``constant`` is the stabilisation, (ne, 2 nb, 2 nb) or (1, ...), or None; ``points_number`` the
+    number of integration points of an element."""
 
     tables: list[StrainTables]
     constant: Array | None

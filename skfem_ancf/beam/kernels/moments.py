@@ -44,12 +44,10 @@ def add_moments(moments, factors, u, f):
 @source
 def mean_turning(a, b, g):
     """A mean derivative of the angle from e to d, whose work from a to b is the change of angle.
-
     The rows of a, b and g are components of d and e. The angle is a function of ``c = e . d`` and
     ``s = e x d``. Its discrete gradient by both (Gonzalez 1996), times their derivatives in the
     middle of the step, has no resultant moment, since both are invariant under common rotations of
-    d and e.
-    """
+    d and e."""
     for e in indices(a.shape[1]):
         c0, s0 = a[2, e] * a[0, e] + a[3, e] * a[1, e], a[2, e] * a[1, e] - a[3, e] * a[0, e]
         c1, s1 = b[2, e] * b[0, e] + b[3, e] * b[1, e], b[2, e] * b[1, e] - b[3, e] * b[0, e]
