@@ -24,10 +24,8 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 
 class Failure(NamedTuple):
-    """A member of a sweep that could not be built, solved or measured.
-
-    ``member`` is its index, ``parameters`` are by name, ``error`` is the class and message.
-    """
+    """A member of a sweep that could not be built, solved or measured. ``member`` is its index,
+    ``parameters`` are by name, ``error`` is the class and message."""
 
     member: int
     parameters: dict[str, Any]
@@ -69,9 +67,7 @@ class Sweep:
 
     def to_xarray(self) -> Any:
         """An ``xarray.Dataset``: values along "member", with the parameters as coordinates.
-
-        MissingExtra is raised if xarray is not installed.
-        """
+        MissingExtra is raised if xarray is not installed."""
         values, parameters = (
             {name: (("member", *(f"{name}_{axis}" for axis in range(x.ndim - 1))), x)
              for name, x in arrays.items()} for arrays in (self.values, self.parameters))

@@ -72,10 +72,8 @@ class BoundConstraint(Bound):
         return J
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """Rows, columns and values (k,) of :meth:`jacobian`; repeated entries are summed.
-
-        By default from the dense matrix, which is slow in large scenes.
-        """
+        """Rows, columns and values (k,) of :meth:`jacobian`; repeated entries are summed. By
+        default from the dense matrix, which is slow in large scenes."""
         J = self.jacobian(u, t)
         rows, columns = np.nonzero(J)
         return rows, columns, J[rows, columns]
@@ -101,18 +99,15 @@ class BoundConstraint(Bound):
         return out
 
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
-        """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``.
-
-        By default the Jacobian in the middle, exact for quadratic Phi.
-        """
+        """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``. By
+        default the Jacobian in the middle, exact for quadratic Phi."""
         return self.entries(0.5 * (u0 + u1), t)
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
         """X (N,) with ``X . (u1 - u0) = multipliers . D (v1 - v0) / 2``, D of :meth:`mean_entries`.
-
-        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, exact for quadratic Phi.
-        """
+        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, exact for quadratic
+        Phi."""
         second, v = self.curvature(0.5 * (u0 + u1), t, multipliers), v0 + v1
         if second is None:
             return 0.0 * v
@@ -239,16 +234,12 @@ class BoundForce(Bound):
 
     def stiffness(self, x: Array, v: Array, t: float) -> Any:
         """Derivative of the force by the positions, shape (n, 2, n, 2), the derivative's axes last.
-
-        By default by a complex step or differences.
-        """
+        By default by a complex step or differences."""
         return derivative(lambda y: self.force(y, v, t), x)
 
     def mean_stiffness(self, x: Array, y: Array, t: float, *past: Any) -> Any:
-        """Twice the derivative of :meth:`mean_force` by y, if ``changing``.
-
-        By default the stiffness in the middle.
-        """
+        """Twice the derivative of :meth:`mean_force` by y, if ``changing``. By default the
+        stiffness in the middle."""
         return self.stiffness(0.5 * (x + y), 0.0 * x, t, *past)
 
     def resistance(self, x: Array, v: Array, t: float) -> Any:
@@ -454,12 +445,10 @@ def try_force(bound: Any, sizes: Any = None) -> None:
 
 
 def _matrix(K, n):
-    """A derivative as a matrix (n, n)."""
     return K if sparse.issparse(K) else np.reshape(K, (n, n))
 
 
 def _require_derivatives(bound, x, u, d):
-    """Raise InputError unless stiffness and resistance are the derivatives of the force."""
     v, d = u.reshape(x.shape), d.reshape(x.shape)
     for name, at in (("stiffness", lambda s: (x + v + s * d, 0.0 * d, 0.0)),
                      ("resistance", lambda s: (x, v + s * d, 0.0))):
@@ -469,7 +458,6 @@ def _require_derivatives(bound, x, u, d):
 
 
 def _require_potential(bound, x, u, d):
-    """Raise InputError unless the force without velocities is minus the slope of the potential."""
     x, d = x + u.reshape(x.shape), d.reshape(x.shape)
     for t in (0.0, ASIDE):
         require_slope(f"minus force(x, v, t) of {bound!r}", "potential(x)", along(
@@ -479,7 +467,6 @@ def _require_potential(bound, x, u, d):
 
 
 def require_derivatives(joint: BoundConstraint, sizes: Array, u: Array, d: Array) -> None:
-    """Raise InputError unless jacobian and curvature of a user-defined joint fit its value."""
     multipliers = np.cos(np.arange(len(joint.equations)))
     try:
         values = along(lambda s: joint.value(u + s * d, 0.0))

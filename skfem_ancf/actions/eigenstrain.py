@@ -1,9 +1,7 @@
-"""Eigenstrains: stress-free strains of temperature, swelling or actuation.
-
-The strain energy is W(E - E0). For stress linear in the strain it is W(E) minus the work of
-``S0 = D E0`` in the strain, a load with the initial stress -S0. E0 is sampled and interpolated as
-the formulation does with E. For other laws see :mod:`skfem_ancf.actions.eigenstrain`.
-"""
+"""Eigenstrains: stress-free strains of temperature, swelling or actuation. The strain energy is W(E
+- E0). For stress linear in the strain it is W(E) minus the work of ``S0 = D E0`` in the strain, a
+load with the initial stress -S0. E0 is sampled and interpolated as the formulation does with E. For
+other laws see :mod:`skfem_ancf.actions.eigenstrain`."""
 
 from __future__ import annotations
 
@@ -228,7 +226,6 @@ class EigenStrain(Load):
                                           np.zeros(self.beam.N))
 
     def _scaled_stresses(self, factor):
-        """The kernel's arguments."""
         return [-factor * given for given in self.eigen_stresses]
 
     def force(self, u: Array) -> Array:
@@ -351,7 +348,6 @@ def _evaluated(name, f, x, y):
 
 
 def require_alone(loads: Sequence[Any]) -> None:
-    """Raise InputError where several eigenstrains act on one beam with a nonlinear law."""
     strains = [load for load in loads if isinstance(load, EigenStrain)]
     for load in strains:
         refuse(load.grows and sum(other.beam is load.beam for other in strains) > 1,

@@ -444,7 +444,6 @@ class Energy(Density):
         return f"<Energy {name} over {self.over!r}>"
 
     def _require_derivatives(self, u, d):
-        """Raise InputError unless the functions are consistent near a displacement u."""
         for part in self._parts:
             y, dy = self._variables(u, part), self._variables(d, part)
             dy -= self._variables(0.0 * d, part)
@@ -463,7 +462,6 @@ class Energy(Density):
                               np.einsum("klep,lep->kep", H, dy))
 
     def _require_invariance(self):
-        """Raise InputError where psi changes under rigid motions."""
         shift, Q = self.beam.size * np.array([0.7, -0.4]), np.array([[0.6, -0.8], [0.8, 0.6]])
         for part in self._parts:
             y = self._variables(1e-2 * self.beam.sizes * np.cos(np.arange(self.beam.N)), part)

@@ -209,7 +209,6 @@ class FormLoad(Density):
                    np.zeros(self.beam.N))
 
     def _require_tangent(self, u, d):
-        """Raise InputError unless the tangent is the derivative of the form."""
         part, = self._parts
         y, dy = self._variables(u, part), self._variables(d, part)
         dy -= self._variables(0.0 * d, part)

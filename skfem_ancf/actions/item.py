@@ -99,10 +99,8 @@ class Item(Immutable, Bound):
         return (self,)
 
     def bind(self, layout: Any) -> Any:
-        """A copy bound to the DOFs of a scene, of a :class:`~skfem_ancf.beam.layout.Layout`.
-
-        Do not change ``self``, which is bound to other meshes later.
-        """
+        """A copy bound to the DOFs of a scene, of a :class:`~skfem_ancf.beam.layout.Layout`. Do not
+        change ``self``, which is bound to other meshes later."""
         return self._thawed()
 
     def bound_on(self, layout: Layout) -> list[Any]:
@@ -150,7 +148,6 @@ class Item(Immutable, Bound):
         return f"<{' '.join(part for part in parts if part)}>"
 
     def _with(self, **changes):
-        """A copy with changed attributes."""
         other = self._thawed()
         for name, value in changes.items():
             setattr(other, name, value)

@@ -146,11 +146,8 @@ class Load(Item):
         return (self._with(beam=layout.number(self.beam)),)
 
     def bind(self, beam: Any) -> Any:
-        """A copy bound to a beam, or to a rigid body if :attr:`for_bodies`.
-
-        Override it to compute data of the beam. Do not change ``self``, which is bound to other
-        beams later.
-        """
+        """A copy bound to a beam, or to a rigid body if :attr:`for_bodies`. Override it to compute
+        data of the beam. Do not change ``self``, which is bound to other beams later."""
         return self._with(beam=beam)
 
     def bound_on(self, layout: Layout) -> list[Any]:
@@ -180,10 +177,8 @@ class Load(Item):
         raise NotImplementedError
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        """Rows, columns and values of the derivative of the force.
-
-        Rows and columns are degrees of freedom of one node or of neighbouring nodes.
-        """
+        """Rows, columns and values of the derivative of the force. Rows and columns are degrees of
+        freedom of one node or of neighbouring nodes."""
         raise NotImplementedError
 
     def potential(self, u: Array) -> float | None:
@@ -192,10 +187,8 @@ class Load(Item):
 
     def distribution(self, u: Array) -> Distribution | None:
         """Distribution of the force over the body at the displacement ``u``, for recovered fields.
-
         By default it acts on the nodes, or on the point inside an element, whose degrees of freedom
-        it acts on; None (unknown) if these are neighbours.
-        """
+        it acts on; None (unknown) if these are neighbours."""
         stations = stations_of_vector(self.beam, self.force(u))
         return None if stations is None else Distribution(stations=stations)
 
@@ -309,7 +302,6 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
 
 
 def _require_derivatives(load, u, d):
-    """Raise InputError unless stiffness and potential of a user-defined load fit its force."""
     try:
         force = along(lambda s: load.force(u + s * d))
         potential = along(lambda s: load.potential(u + s * d))
@@ -582,11 +574,8 @@ class EndMoment(Load):
         return (self.beam.q0_local[self.dofs] + u[self.dofs]) @ self.c
 
     def angle(self, u: Array) -> float:
-        """Rotation of the section in radians.
-
-        Full turns are counted along the beam from the section at its other end, whose angle is
-        taken in (-pi, pi].
-        """
+        """Rotation of the section in radians. Full turns are counted along the beam from the
+        section at its other end, whose angle is taken in (-pi, pi]."""
         nd = self.beam.nd
         rows = self.dofs - self.node * nd + nd * np.arange(self.beam.N // nd)[:, None, None]
         start = self.beam.q0_local[rows] @ self.c
@@ -632,11 +621,9 @@ _NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
 
 class TimedLoad(Load):
-    """A force that depends on time and not on the displacement.
-
-    A subclass defines :meth:`places` or :meth:`at`. Single static solutions take the load at time
-    1; :meth:`skfem_ancf.Scene.run` and motions take the current time.
-    """
+    """A force that depends on time and not on the displacement. A subclass defines :meth:`places`
+    or :meth:`at`. Single static solutions take the load at time 1; :meth:`skfem_ancf.Scene.run` and
+    motions take the current time."""
 
     constant = False
     # of the load at a time

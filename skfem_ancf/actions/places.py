@@ -62,7 +62,6 @@ def dense_entries(rows: Array, columns: Array, values: Array) -> tuple[Array, Ar
 
 
 def is_ground(beam: Any) -> bool:
-    """True for the name of the ground."""
     return isinstance(beam, str) and beam == GROUND
 
 

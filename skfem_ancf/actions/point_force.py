@@ -31,10 +31,8 @@ def is_off_axis(beam: Beam, X: Array) -> bool:
 
 
 class DirectedForce(Load):
-    """A force F(d) on a point and a couple G(d) on the tangent d there, (2,) each; bound.
-
-    A subclass defines :meth:`both` and :meth:`slopes_of_both`.
-    """
+    """A force F(d) on a point and a couple G(d) on the tangent d there, (2,) each; bound. A
+    subclass defines :meth:`both` and :meth:`slopes_of_both`."""
 
     constant = False
     # element and xi of a beam; DOFs and weights of the point and of the tangent, and its start

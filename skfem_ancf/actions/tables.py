@@ -1,7 +1,5 @@
-"""Tables of the joints and loads of a scene, and the kernels that evaluate them.
-
-Joints are ``Phi = c + g . u + u . H u / 2``; c and g may depend on time.
-"""
+"""Tables of the joints and loads of a scene, and the kernels that evaluate them. Joints are ``Phi =
+c + g . u + u . H u / 2``; c and g may depend on time."""
 
 from typing import NamedTuple
 
@@ -56,31 +54,26 @@ class LoadTables(NamedTuple):
 
 @primitive("skfem_ancf.core.loops")
 def add_each(out, at, x):
-    """out[at] += x, with repeated indices."""
     np.add.at(out, at, x)
 
 
 @primitive("skfem_ancf.core.loops")
 def add_products(out, at, v, x, i):
-    """out[at] += v x[i], with repeated indices."""
     np.add.at(out, at, v * x[i])
 
 
 @primitive("skfem_ancf.core.loops")
 def add_triples(out, at, v, x, i, y, j):
-    """out[at] += v x[i] y[j]."""
     np.add.at(out, at, v * x[i] * y[j])
 
 
 @primitive("skfem_ancf.core.loops")
 def add_entries(J, k, i, v):
-    """J[k, i] += v."""
     np.add.at(J, (k, i), v)
 
 
 @primitive("skfem_ancf.core.loops")
 def add_weighted_entries(J, k, i, v, x, j):
-    """J[k, i] += v x[j]."""
     np.add.at(J, (k, i), v * x[j])
 
 
@@ -96,7 +89,6 @@ def subtract_from_band(A, i, j, v, x, k):
 
 @apart("joints", JointTables, F1, F1, float, F1, F1)
 def constraint(joints, c, g, t, u, phi):
-    """Phi at u."""
     if joints.custom > 0:
         copy(c, phi)
         call_custom(JOINTS, joints.custom, np.int64(0), t, 1.0, u, u, phi)
@@ -110,7 +102,6 @@ def constraint(joints, c, g, t, u, phi):
 
 @apart("joints", JointTables, F1, float, F1, F1, F1)
 def add_constraint_rate(joints, g, t, u, v, out):
-    """out += J(u) v."""
     if joints.custom > 0:
         call_custom(JOINTS, joints.custom, np.int64(1), t, 1.0, u, v, out)
         return
@@ -120,7 +111,6 @@ def add_constraint_rate(joints, g, t, u, v, out):
 
 @apart("joints", JointTables, F1, float, F1, F1, F1)
 def add_joint_force(joints, g, t, u, multipliers, out):
-    """out += J(u)^T multipliers."""
     if joints.custom > 0:
         call_custom(JOINTS, joints.custom, np.int64(2), t, 1.0, u, multipliers, out)
         return
@@ -151,7 +141,6 @@ def joint_directions(joints, g, t, u, J):
 
 @source
 def _dead_force(loads, factors, out):
-    """Force of dead loads."""
     clear(out)
     for k in range(loads.vectors.shape[0]):
         c, vector = factors[k], loads.vectors[k]

@@ -267,10 +267,8 @@ class Beam(Immutable):
         return Finder(self.mesh)
 
     def probe(self, point: ArrayLike) -> tuple[Array, Array]:
-        """Numbers (2, n) and weights (n,) of the DOFs in the position of a material point.
-
-        The position is ``q[dofs] @ weights``.
-        """
+        """Numbers (2, n) and weights (n,) of the DOFs in the position of a material point. The
+        position is ``q[dofs] @ weights``."""
         return kinematics.probe(self, point)
 
     @cached_property

@@ -538,7 +538,6 @@ def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array
 
 
 def _require_plane(basis):
-    """Raise InputError unless a basis has plane vectors on all cells."""
     refuse(not isinstance(basis, Basis), "a Domain needs a Basis of scikit-fem, got {!r}", basis)
     if basis.mesh.dim() != 2:
         raise InputError(f"a Domain is plane, as beams are, got a mesh of dimension "

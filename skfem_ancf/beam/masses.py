@@ -68,7 +68,6 @@ def points_along(beam: Any) -> int:
 
 
 def masses_of(beam: Any) -> Masses:
-    """The Masses of a beam."""
     if not beam.has_sections:
         return _of_cable(beam)
     across, element, mesh, n = beam.across, beam.element, beam.mesh, points_along(beam)

@@ -1,8 +1,6 @@
-"""Material points and their location in elements.
-
-A point is given by its position (x, y) in the reference configuration: a tuple, a list or an array
-of two numbers. Several points are an array (2, n), as in scikit-fem, or a list of points.
-"""
+"""Material points and their location in elements. A point is given by its position (x, y) in the
+reference configuration: a tuple, a list or an array of two numbers. Several points are an array (2,
+n), as in scikit-fem, or a list of points."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
-"""Stress and history variables between the integration points of laws with a history.
-
-They are linear between the points, also across the section: at the edge of a plastic zone the
-stress has a kink, at which polynomials oscillate; and it is no function of the strain alone.
-"""
+"""Stress and history variables between the integration points of laws with a history. They are
+linear between the points, also across the section: at the edge of a plastic zone the stress has a
+kink, at which polynomials oscillate; and it is no function of the strain alone."""
 
 from __future__ import annotations
 

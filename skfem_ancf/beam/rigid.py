@@ -179,10 +179,8 @@ class RigidBody(Immutable):
         return np.tensordot(self._frame.T, x - self.position.reshape((2,) + (1,) * (x.ndim - 1)), 1)
 
     def probe(self, at: Any) -> tuple[Array, Array]:
-        """Numbers and weights (2, 3) of the DOFs in the position of a material point.
-
-        The position is ``sum(q[dofs] * weights, axis=1)``; None is the centre of mass.
-        """
+        """Numbers and weights (2, 3) of the DOFs in the position of a material point. The position
+        is ``sum(q[dofs] * weights, axis=1)``; None is the centre of mass."""
         a, b = self.local(self.place(at))
         return np.array([[0, 2, 3], [1, 3, 2]]), np.array([[1.0, a, -b], [1.0, a, b]])
 

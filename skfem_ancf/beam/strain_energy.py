@@ -119,7 +119,6 @@ def copies_of(body: Body, n: int, N: int) -> Body:
 
 
 def stress_size(body: Body) -> int:
-    """Number of stresses of all samples."""
     return int(body.table[-1, END]) if len(body.table) else 0
 
 
@@ -151,7 +150,6 @@ def _gradients(body, k, gradients):
 
 @source
 def body_force(body, u, f):
-    """The internal force."""
     clear(f)
     for k in range(body.table.shape[0]):
         run_force(tables_of(body, k), u, f)
@@ -171,7 +169,6 @@ def body_tangent(body, u, f, independent, use_independent, stresses, A):
 
 @source
 def body_stress(body, u, stresses):
-    """The stresses at u."""
     for k in range(body.table.shape[0]):
         run_stress(tables_of(body, k), u, _stress(body, k, stresses))
 
@@ -206,7 +203,6 @@ def add_viscous_stress(viscous, body, copies, k, u, v, scratch, out):
 
 @source
 def add_viscous_force(body, u, v, f):
-    """Add the force of viscous stresses."""
     for k in range(body.table.shape[0]):
         run_viscous(tables_of(body, k), u, v, f)
 
@@ -234,7 +230,6 @@ def body_mixed(body, mean, u0, u1, f, independent, stresses):
 
 @source
 def add_force_of(body, u, stresses, f):
-    """Add the force at u of given stresses."""
     for k in range(body.table.shape[0]):
         run_given(tables_of(body, k), u, _stress(body, k, stresses), f)
 

@@ -1,9 +1,7 @@
-"""Band matrices of chains of elements, for kernels and with LAPACK.
-
-Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, with :data:`SPARE` zeros after each
-column; L D L^T factors replace it. Unsymmetric (``top`` > 0): entry (i, j) at ``j * ld + top + i -
-j``, the storage of LAPACK's ``gbtrf``, whose factors replace it.
-"""
+"""Band matrices of chains of elements, for kernels and with LAPACK. Symmetric: the lower half,
+entry (i, j) at ``j * ld + i - j``, with :data:`SPARE` zeros after each column; L D L^T factors
+replace it. Unsymmetric (``top`` > 0): entry (i, j) at ``j * ld + top + i - j``, the storage of
+LAPACK's ``gbtrf``, whose factors replace it."""
 
 from __future__ import annotations
 
@@ -94,7 +92,6 @@ class BandMatrix(Band):
     # assembly
 
     def clear(self) -> None:
-        """Set every entry to zero."""
         self.flat.fill(0.0)
         self.factors = None
 
@@ -130,7 +127,6 @@ class BandMatrix(Band):
         np.add.at(self.flat, self.position(i, j), values)
 
     def diagonal(self) -> Array:
-        """A copy of the diagonal."""
         return self.flat[self.top::self.ld].copy()
 
     def add_diagonal(self, values: Array) -> None:
@@ -253,7 +249,6 @@ class BandMatrix(Band):
         return scale[i0:i1, None] * out * scale[j0:j1]
 
     def determinant_sign(self) -> int:
-        """Sign of the determinant, 1 or -1."""
         if self.factors is None:
             self.factorize()
         lu = self.factors
@@ -276,11 +271,9 @@ class BandMatrix(Band):
         return float(abs(A - A.T).max()), float(abs(A).max())
 
     def toarray(self) -> Array:
-        """A dense array, shape (n, n)."""
         return self._dense(0, self.n, 0, self.n, np.ones(self.n))
 
     def tocsc(self) -> sparse.csc_matrix:
-        """A sparse matrix in CSC format."""
         i, j, values = _entries(self)
         return sparse.coo_matrix((values, (i, j)), shape=(self.n, self.n)).tocsc()
 
@@ -341,7 +334,6 @@ def as_lapack(A: Band) -> Array:
 
 @primitive("skfem_ancf.core.loops")
 def multiply(A, x, y):
-    """y = A x."""
     n, k = len(x), A.width
     ab = A.flat.reshape(-1, A.ld).T  # whole columns, of which BLAS needs no copy
     if A.top == 0:
@@ -357,7 +349,6 @@ def multiply(A, x, y):
 
 @primitive("skfem_ancf.core.loops")
 def add_multiple(c, x, y):
-    """y += c x."""
     y += c * x
 
 
@@ -541,14 +532,12 @@ def _complex(A):
 
 @source
 def clear(x):
-    """x = 0."""
     for i in indices(x.size):
         x[i] = 0.0
 
 
 @source
 def copy(a, b):
-    """b = a."""
     for i in indices(a.size):
         b[i] = a[i]
 
@@ -604,7 +593,6 @@ def fix_stored(flat, ld, width, top, fixed):
 
 @source
 def diagonal(A, d):
-    """Write the diagonal to d."""
     rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
     for j in indices(d.size):
         d[j] = rows[j, A.top]
@@ -612,7 +600,6 @@ def diagonal(A, d):
 
 @source
 def add_to_diagonal(A, d):
-    """Add d to the diagonal."""
     rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
     for j in indices(d.size):
         rows[j, A.top] += d[j]
@@ -620,25 +607,21 @@ def add_to_diagonal(A, d):
 
 @primitive("skfem_ancf.core.loops")
 def dot(a, b):
-    """Scalar product."""
     return np.dot(a, b)
 
 
 @primitive("skfem_ancf.core.loops")
 def weighted_square(x, weights):
-    """Weighted sum of squares."""
     return np.dot(x * x, weights)
 
 
 @primitive("skfem_ancf.core.loops")
 def total(x):
-    """Sum."""
     return np.sum(x)
 
 
 @primitive("skfem_ancf.core.loops")
 def smallest(x):
-    """Minimum."""
     return np.min(x)
 
 

@@ -1,7 +1,5 @@
-"""Callbacks from kernels to Python objects: user-defined items and linear solvers.
-
-An object is known by a handle, a positive integer that compiled code can store.
-"""
+"""Callbacks from kernels to Python objects: user-defined items and linear solvers. An object is
+known by a handle, a positive integer that compiled code can store."""
 
 import signal
 import weakref

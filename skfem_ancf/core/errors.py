@@ -1,9 +1,6 @@
-"""Errors of the package and checks of arguments.
-
-Every error derives from :class:`AncfError`; those about input are also ``ValueError``. The
-functions ``require_...`` return their argument, converted, or raise an :class:`InputError`;
-``name`` is the argument's name in the message.
-"""
+"""Errors of the package and checks of arguments. Every error derives from :class:`AncfError`; those
+about input are also ``ValueError``. The functions ``require_...`` return their argument, converted,
+or raise an :class:`InputError`; ``name`` is the argument's name in the message."""
 
 from __future__ import annotations
 

@@ -105,11 +105,8 @@ class _Freezing(type):
 
 
 class Immutable(metaclass=_Freezing):
-    """Base class of descriptions, whose public attributes only constructors set.
-
-    Arrays become read-only. Private attributes and cached properties, which are not pickled, may
-    be set later.
-    """
+    """Base class of descriptions, whose public attributes only constructors set. Arrays become
+    read-only. Private attributes and cached properties, which are not pickled, may be set later."""
 
     _frozen = False
 

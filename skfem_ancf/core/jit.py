@@ -1,9 +1,7 @@
 """Compilation of functions marked by :mod:`skfem_ancf.core.source`, by Numba's public interface.
-
 Marked functions are registered with ``numba.extending``. Functions that are called from Python, or
 by address, are cached on disk. Numba compiles a function again in each caller; large parts are
-therefore called by address.
-"""
+therefore called by address."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
-"""Loops that replace calls of NumPy, SciPy and Python in compiled code.
-
-Each replaces the function of its name that :func:`skfem_ancf.core.source.primitive` marks.
-"""
+"""Loops that replace calls of NumPy, SciPy and Python in compiled code. Each replaces the function
+of its name that :func:`skfem_ancf.core.source.primitive` marks."""
 
 import numpy as np
 

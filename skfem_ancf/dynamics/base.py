@@ -143,10 +143,8 @@ class Scheme:
         return self.error_constant * dt**2 * (new.algorithmic - old.algorithmic)
 
     def near(self, system: System) -> float:
-        """Fraction of a step below which accelerations within it are interpolated.
-
-        In shorter steps a finite difference would consist of round-off.
-        """
+        """Fraction of a step below which accelerations within it are interpolated. In shorter steps
+        a finite difference would consist of round-off."""
         return NEAR
 
     def lasting(self, integrator: Any, du: Array, time: float) -> Array:

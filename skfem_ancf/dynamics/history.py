@@ -149,10 +149,8 @@ class History(MaterialPoints, SpringForces):
 
     def state(self, k: int) -> State:
         """The instant ``k`` as a State: strain, reactions (with inertia), plots, files.
-
         :meth:`Scene.integrate <skfem_ancf.Scene.integrate>` with ``start=`` this state continues
-        the motion.
-        """
+        the motion."""
         k = require_index("k", k, len(self))
         last, arrays = self._last
         if last is not None and k == len(self) - 1 and last.t == self.t[k]:
@@ -271,20 +269,16 @@ class History(MaterialPoints, SpringForces):
 
     @cached_property
     def potential_energy(self) -> Array:
-        """Potential of the loads, zero in the reference configuration, shape (nt,).
-
-        The potential of a moment counts whole turns.
-        """
+        """Potential of the loads, zero in the reference configuration, shape (nt,). The potential
+        of a moment counts whole turns."""
         return np.array([self.system.load_potential(u, t, turned) for u, t, turned in zip(
             self.u, self.t, self._columns["turns"])])
 
     @property
     def total_energy(self) -> Array:
-        """Sum of strain, kinetic and potential energy, shape (nt,).
-
-        The sum with :attr:`dissipated` is constant unless loads depend on time or have no
-        potential, as those that follow the body.
-        """
+        """Sum of strain, kinetic and potential energy, shape (nt,). The sum with :attr:`dissipated`
+        is constant unless loads depend on time or have no potential, as those that follow the
+        body."""
         return self.strain_energy + self.kinetic_energy + self.potential_energy
 
     @cached_property

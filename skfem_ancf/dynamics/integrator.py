@@ -149,7 +149,6 @@ class Integrator:
 
     @property
     def failure(self) -> str:
-        """Why the last step failed."""
         return self._lost or FAILURES[int(self._state.failure[0])]
 
     @property
@@ -165,7 +164,6 @@ class Integrator:
         other.reset()
 
     def reset(self) -> None:
-        """Set the counts to zero."""
         self._state.iterations[0] = self._state.factorizations[0] = self.substeps = 0
 
     def expect(self, energy: float) -> None:
@@ -409,7 +407,6 @@ class Integrator:
         return self.solve(inertia * s.constraints.free)
 
     def forget(self) -> None:
-        """Discard the factors."""
         self._state.factors[0] = 0
 
     def _load_state(self, values):

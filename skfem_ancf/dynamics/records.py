@@ -326,7 +326,6 @@ def settle(e, t, along, u0, u1, v1, taken):
 
 @source
 def row_of(x, n):
-    """Row n, or the only row."""
     return x[n if x.shape[0] > 1 else 0]
 
 

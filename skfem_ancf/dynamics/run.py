@@ -196,7 +196,6 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
 
 
 def integrator_of(system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
-    """The integrator for a scheme."""
     return (StageIntegrator if scheme.collocates else Integrator)(system, scheme, tol)
 
 
@@ -459,7 +458,6 @@ class Run:
                 for name in COLUMNS}
 
     def history(self) -> History:
-        """The motion so far."""
         at_end = bool(self._stored) and self._stored[-1][0] == self.y.t
         taken = self.integrator
         return History(self.system, self.scheme, self.columns(),

@@ -141,9 +141,7 @@ class Readings(dict[str, "Array"]):
 
     def to_csv(self, filename: StrPath) -> FilePath:
         """Write the readings to a .csv file, in a folder that is made if needed; returns its path.
-
-        The columns are ``t`` and the sensors; those of a vector are called ``tip 0``, ``tip 1``.
-        """
+        The columns are ``t`` and the sensors; those of a vector are called ``tip 0``, ``tip 1``."""
         path, names, columns = require_path("filename", filename, (".csv",)), ["t"], [self.t]
         for name, x in self.items():
             columns.append(x.reshape(len(self.t), -1))
@@ -195,7 +193,6 @@ class Recorder:
             before.append(np.array(values))
 
     def readings(self) -> Readings:
-        """The readings so far."""
         return Readings(np.concatenate([np.zeros(0), *self._t]), {
             name: np.concatenate(read) if read else np.zeros(0)
             for (name, _), read in zip(self.sensors, self._read)})

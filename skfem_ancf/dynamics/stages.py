@@ -1,12 +1,8 @@
-"""Steps of collocation.
-
-With ``A^-1 = T diag(mu) T^-1`` the points decouple into systems ``K + mu D / h + mu^2 M / h^2``,
-one for each pair of eigenvalues: complex symmetric, with a positive real part up to a factor, so
-that L D L^T factors need no pivoting.
-
-Materials and items with a history have that of the start of the step at all points, and the time
-since then; it changes at the end of the step.
-"""
+"""Steps of collocation. With ``A^-1 = T diag(mu) T^-1`` the points decouple into systems ``K + mu D
+/ h + mu^2 M / h^2``, one for each pair of eigenvalues: complex symmetric, with a positive real part
+up to a factor, so that L D L^T factors need no pivoting. Materials and items with a history have
+that of the start of the step at all points, and the time since then; it changes at the end of the
+step."""
 
 import numpy as np
 

@@ -20,7 +20,6 @@ from .records import ALL, add_damping, damping_force, factorize_rows
 
 @source
 def kinetic_energy(M, v, scratch):
-    """v . M v / 2."""
     multiply(M, v, scratch)
     return 0.5 * dot(v, scratch)
 

@@ -1,8 +1,6 @@
-"""Sampling of functions of time: load amplitudes, motions of supports and joints.
-
-Rates are those of a polynomial through samples within one step. Samples outside of the step are
-not used, so that a kink at the end of a step does not spoil the rates of its neighbours.
-"""
+"""Sampling of functions of time: load amplitudes, motions of supports and joints. Rates are those
+of a polynomial through samples within one step. Samples outside of the step are not used, so that a
+kink at the end of a step does not spoil the rates of its neighbours."""
 
 from __future__ import annotations
 

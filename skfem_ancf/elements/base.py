@@ -359,9 +359,7 @@ class ElementBeam(Immutable, Element):
     def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
                ) -> tuple[Array, Array]:
         """Derivatives of all local functions along and across the axis, and the beam's frame.
-
-        Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints).
-        """
+        Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints)."""
         _, d_xi, d_eta = self.of_mesh(mapping, X, tind)
         rates, frame = mapping.in_frame(X, tind)
         return rates[:, 0] * d_xi[:, None] + rates[:, 1] * d_eta[:, None], frame
@@ -396,11 +394,8 @@ class ElementBeam(Immutable, Element):
     @cached_property
     def halving(self) -> Array:
         """Matrix (2 nodal_dofs, 2 nodal_dofs) from an element to its left half, for unit length and
-        height.
-
-        Degrees of freedom are scaled by the length to the number of their derivatives along X. The
-        last nodal_dofs rows are those of the middle.
-        """
+        height. Degrees of freedom are scaled by the length to the number of their derivatives along
+        X. The last nodal_dofs rows are those of the middle."""
         n = self.axis_degree + 1, max(self.order, 1) + 1
         X = np.array(np.meshgrid(np.linspace(0, 1, n[0]), np.linspace(0, 1, n[1]))).reshape(2, -1)
         half = np.array([0.5 * X[0], X[1]])

@@ -1,12 +1,9 @@
-"""Static condensation of frames: members are condensed to their ends, ends to the nodes.
-
-An end shares x, y and the rotation of the section with its node; its other unknowns, such as the
-stretch of the section's direction, are eliminated. In a frame along this direction the shared
-unknowns are those of the node plus the residual of the joint equations. Multipliers are therefore
-not unknowns: they are the residual forces at the ends.
-
-Statics, modes and time integration use the same factors.
-"""
+"""Static condensation of frames: members are condensed to their ends, ends to the nodes. An end
+shares x, y and the rotation of the section with its node; its other unknowns, such as the stretch
+of the section's direction, are eliminated. In a frame along this direction the shared unknowns are
+those of the node plus the residual of the joint equations. Multipliers are therefore not unknowns:
+they are the residual forces at the ends. Statics, modes and time integration use the same
+factors."""
 
 from __future__ import annotations
 
@@ -108,11 +105,9 @@ class Condensed:
 
     @property
     def ready(self) -> bool:
-        """True if there are factors."""
         return self._nodes is not None
 
     def forget(self) -> None:
-        """Discard the factors."""
         self._parts, self._nodes = [], None
 
     def _unknown(self):
@@ -216,7 +211,6 @@ class CondensedMass:
         self._last: tuple[float, Array, Array] | None = None
 
     def factorize(self, u: Array) -> None:
-        """Factorise at a displacement (N,)."""
         self.at = u.copy()
         self._condensed.factorize(self.at, 0.0 * self._condensed.at[1])
 
@@ -426,7 +420,6 @@ class _Part:
         return pivot
 
     def inertia(self) -> Inertia:
-        """Inertia of the eliminated matrices."""
         negative, singular = 0, False
         for A in [*(A for A, *_ in self._inner), self._outer]:
             size = 1.0 / np.sqrt(np.abs(A.diagonal(axis1=1, axis2=2)))

@@ -1,9 +1,7 @@
-"""Linear systems ``[K, J^T; J, 0] [x; l] = [b; c]`` of a scene, and their inertia.
-
-There are four ways: LAPACK for a band matrix alone; a Schur complement for few multipliers and a
-definite K; sparse LU on the null space of J, also for entries outside of the band; static
-condensation for frames.
-"""
+"""Linear systems ``[K, J^T; J, 0] [x; l] = [b; c]`` of a scene, and their inertia. There are four
+ways: LAPACK for a band matrix alone; a Schur complement for few multipliers and a definite K;
+sparse LU on the null space of J, also for entries outside of the band; static condensation for
+frames."""
 
 from __future__ import annotations
 
@@ -363,7 +361,6 @@ class NullSpace:
         return (splu(self._reduced), False) if lu is None else (lu, True)
 
     def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
-        """Solve for right-hand sides b (n,) and c (m,); returns x and l."""
         x, b, T = np.zeros(self._shape[1]), self._sizes * b, self._T
         for block, at, _, M in self._groups:
             x[at] = (M @ c[block.rows][:, :, None])[:, :, 0]

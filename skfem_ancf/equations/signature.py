@@ -154,7 +154,6 @@ def _pivots(A):
 
 
 def determinant_sign(A: Array | sparse.csr_array) -> int:
-    """The sign of the determinant: 1 or -1."""
     if isinstance(A, np.ndarray):
         return -1 if np.linalg.slogdet(A)[0] < 0.0 else 1
     lu, one = splu(A.tocsc()), sparse.eye(A.shape[0], format="csr")

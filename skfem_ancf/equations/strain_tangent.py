@@ -1,9 +1,6 @@
-"""The tangent of a scene in terms of strains, and its accurate inverse.
-
-The entries of an assembled tangent add axial and shear stiffness E A to the bending stiffness
-E I / L^2, which is below their round-off from L / h = 1e8 on. Summing the strains ``B x`` first
-avoids the cancellation.
-"""
+"""The tangent of a scene in terms of strains, and its accurate inverse. The entries of an assembled
+tangent add axial and shear stiffness E A to the bending stiffness E I / L^2, which is below their
+round-off from L / h = 1e8 on. Summing the strains ``B x`` first avoids the cancellation."""
 
 from __future__ import annotations
 

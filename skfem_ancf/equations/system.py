@@ -337,7 +337,6 @@ class System:
                    for b, s in zip(self.beams, self.slices))
 
     def energy_of_forces(self, u: Array, t: float = 1.0) -> float:
-        """Potential of the force elements."""
         if not self.forces.elements:
             return 0.0
         return self.forces.potential(self.backend.tables.plain.forces, u, t)
@@ -410,12 +409,10 @@ class System:
         return max([2 * b.nd - 1 for b in self.members] + [d.bandwidth for d in self.domains])
 
     def new_band(self) -> BandMatrix:
-        """A zero band matrix."""
         return BandMatrix.zeros(self.N, self.bandwidth, self.symmetric)
 
     @shared
     def mass(self) -> BandMatrix:
-        """The mass matrix."""
         M = self.new_band()
         for beam, s in zip(self.beams, self.slices):
             for first in range(0, beam.mesh.nelements, 1024):  # to limit the memory

@@ -252,7 +252,6 @@ class Tables:
 
     @property
     def handle(self) -> int:
-        """The handle of the user-defined items."""
         if self._user_defined is None:
             self._user_defined = UserDefined(self.system, self._loads[-1])
             self._handle = handle_of(self._user_defined)
@@ -265,7 +264,6 @@ class Tables:
 
     @cached_property
     def stresses_size(self) -> int:
-        """Number of stresses of all beams."""
         return stress_size(self.plain.body)
 
     # loads

@@ -214,11 +214,9 @@ class StressForm(BeamLinearForm, PiolaForm):
 
 
 class ModuliForm(BeamBilinearForm, PiolaTangent):
-    """A bilinear form ``int grad v : A : grad u`` defined by the moduli A = dP / dF.
-
-    The decorated function takes ``w`` and returns A (2, 2, 2, 2, nelements, npoints). All pairs of
-    local functions are contracted at once by matrix products.
-    """
+    """A bilinear form ``int grad v : A : grad u`` defined by the moduli A = dP / dF. The decorated
+    function takes ``w`` and returns A (2, 2, 2, 2, nelements, npoints). All pairs of local
+    functions are contracted at once by matrix products."""
 
 
 # the same for all local functions at once, and mass and loads

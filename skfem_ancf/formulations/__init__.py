@@ -1,8 +1,6 @@
-"""Formulations: where strain components are sampled, and how the strain energy is integrated.
-
-A new one is a file beside this one, with a class derived from :class:`Formulation`, and a line in
-:data:`FORMULATIONS`.
-"""
+"""Formulations: where strain components are sampled, and how the strain energy is integrated. A new
+one is a file beside this one, with a class derived from :class:`Formulation`, and a line in
+:data:`FORMULATIONS`."""
 
 from __future__ import annotations
 
@@ -104,11 +102,8 @@ class Formulation(Immutable):
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:
-        """A constant element stiffness (nelements or 1, 2 nb, 2 nb), or None.
-
-        It is added to that of the terms, and must vanish for finite rigid motions of the reference
-        configuration.
-        """
+        """A constant element stiffness (nelements or 1, 2 nb, 2 nb), or None. It is added to that
+        of the terms, and must vanish for finite rigid motions of the reference configuration."""
         return None
 
     def stress(self, layer: Any, strain: Array, u: Array, X: Array,

@@ -263,10 +263,8 @@ class Material(Immutable):
             "the plane that makes S_33 zero in plane stress")
 
     def stress_zz(self, strain: Array) -> Array:
-        """Second Piola-Kirchhoff stress normal to the plane, shape (...): 0 in plane stress.
-
-        Needed for von Mises and Tresca stress in plane strain.
-        """
+        """Second Piola-Kirchhoff stress normal to the plane, shape (...): 0 in plane stress. Needed
+        for von Mises and Tresca stress in plane strain."""
         if self.plane == "stress":
             return np.zeros(np.shape(strain)[1:])
         raise InputError(
@@ -318,7 +316,6 @@ class ShearCorrected:
 
 
 def _require_derivatives(law, material):
-    """Raise InputError unless the stress of a user-defined law is the derivative of its energy."""
     E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
     try:
         stress, energy = (along(lambda s, of=of: of(E + s * d)) for of in (law.stress, law.energy))

@@ -121,18 +121,14 @@ class HistoryMaterial(Material):
 
     def stress(self, strain: Array, history: Array, dt: float  # type: ignore[override]
                ) -> tuple[Array, Array]:
-        """The stress (3, ...), and the history at the end of the increment, (k, ...).
-
-        At the strain at which a history was found, a further increment of ``dt = 0`` must give the
-        same stress.
-        """
+        """The stress (3, ...), and the history at the end of the increment, (k, ...). At the strain
+        at which a history was found, a further increment of ``dt = 0`` must give the same
+        stress."""
         raise NotImplementedError(f"{type(self).__name__} must define stress(strain, history, dt)")
 
     def moduli(self, strain: Array, history: Array, dt: float) -> Array:  # type: ignore[override]
         """Derivative (3, 3, ...) of the stress by the strain; by default by complex steps.
-
-        Iterations take it as symmetric.
-        """
+        Iterations take it as symmetric."""
         out = []
         for j in range(3):
             step = np.zeros((3,) + (1,) * (np.ndim(strain) - 1), dtype=complex)
@@ -146,10 +142,8 @@ class HistoryMaterial(Material):
         return S, self.moduli(strain, history, dt), after
 
     def energy(self, strain: Array, history: Array) -> Array:  # type: ignore[override]
-        """Energy per volume that unloading would give back, or that is stored, shape (...).
-
-        By default that of the stress in the elastic law. What else work has done is dissipated.
-        """
+        """Energy per volume that unloading would give back, or that is stored, shape (...). By
+        default that of the stress in the elastic law. What else work has done is dissipated."""
         S = self.stress(strain, history, 0.0)[0]
         return 0.5 * np.sum(S * np.tensordot(np.linalg.inv(self.elastic), S, 1), axis=0)
 
@@ -165,11 +159,9 @@ class HistoryMaterial(Material):
     # fibres of a cable
 
     def axial(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
-        """Stress S_xx (...), its derivative, and history of fibres with S_yy = S_xy = 0.
-
-        ``strain`` (...) is that along the fibre. By default the lateral strain is found by Newton's
-        method; ConvergenceError if it is not found, upon which solvers cut their step.
-        """
+        """Stress S_xx (...), its derivative, and history of fibres with S_yy = S_xy = 0. ``strain``
+        (...) is that along the fibre. By default the lateral strain is found by Newton's method;
+        ConvergenceError if it is not found, upon which solvers cut their step."""
         E = np.zeros((3, *np.shape(strain)))
         E[0], E[1] = strain, -self.lateral_ratio * strain
         left = np.inf
@@ -224,7 +216,6 @@ class HistoryMaterial(Material):
         return super().shear_factor(element)
 
     def _require_consistent(self):
-        """Raise InputError unless shapes and derivatives fit."""
         if not hasattr(self, "_consistent"):
             E, d = np.array([[1.3], [-0.7], [0.9]]), np.array([[0.3], [0.7], [-0.6]])
             E, d, zero = SMALL * E, 1e-4 * SMALL * d, np.zeros((self.number, 1))

@@ -1,9 +1,7 @@
-"""Values of common materials by name.
-
-Steels: EN 1993-1-1 (E, nu, thermal expansion) and EN 10025-2, yield strength up to 16 mm; stainless
-steel: EN 10088; aluminium: EN 1999-1-1. All others are typical values at room temperature, as data
-sheets state them: they vary with grade, moisture, temperature, rate and direction of printing.
-"""
+"""Values of common materials by name. Steels: EN 1993-1-1 (E, nu, thermal expansion) and EN
+10025-2, yield strength up to 16 mm; stainless steel: EN 10088; aluminium: EN 1999-1-1. All others
+are typical values at room temperature, as data sheets state them: they vary with grade, moisture,
+temperature, rate and direction of printing."""
 
 from __future__ import annotations
 

@@ -436,9 +436,7 @@ class MeshBeam(NumberedMesh):
     @cached_property
     def is_uniform(self) -> bool:
         """True if one table serves all elements: straight, of equal length, height and direction.
-
-        Their chains have equal lengths, too.
-        """
+        Their chains have equal lengths, too."""
         if not self.is_straight or self.heights is not None:
             return False
         # the round-off of the nodes' positions is no difference in length
@@ -469,9 +467,7 @@ class MeshBeam(NumberedMesh):
 
     def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
         """A function from coordinates x, y to elements, with MeshError outside the body.
-
-        ``mapping`` is not used.
-        """
+        ``mapping`` is not used."""
         find = Finder(self)
         return lambda *x: find.inside(
             require_finite("the points", x, (2, None)))[0].astype(np.int32)

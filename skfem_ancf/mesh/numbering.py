@@ -83,8 +83,7 @@ def _refused(what: str) -> Callable[..., NoReturn]:
 
 class NumberedMesh(Immutable, NearMisses, Mesh2D):
     """What scikit-fem needs of meshes of beams: facets are sections at nodes, then bottoms, then
-    tops.
-    """
+    tops."""
 
     def _freeze(self):
         super()._freeze()
@@ -161,11 +160,9 @@ class NumberedMesh(Immutable, NearMisses, Mesh2D):
 
     def facets_satisfying(self, test: Callable[[Array], Array], boundaries_only: bool = False,
                           normal: ArrayLike | None = None) -> Array:
-        """Facets (k,) whose midpoints satisfy a function of points (2, n).
-
-        ``boundaries_only`` excludes sections between two elements. With ``normal`` (2,), the
-        direction of the side of the facets, the result is an ``OrientedBoundary``.
-        """
+        """Facets (k,) whose midpoints satisfy a function of points (2, n). ``boundaries_only``
+        excludes sections between two elements. With ``normal`` (2,), the direction of the side of
+        the facets, the result is an ``OrientedBoundary``."""
         middle, mapping = np.array([[0.5]]), self._mapping()
         facets = satisfying(test, mapping.G(middle)[:, :, 0])
         if boundaries_only:

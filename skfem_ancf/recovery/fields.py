@@ -1,8 +1,6 @@
-"""Fields for plots, files and evaluation at points.
-
-:data:`FIELDS` has the name, definition, unit, sign and components of each field. A user-defined
-field is a function of :class:`Values`, or a :class:`Field` made from one.
-"""
+"""Fields for plots, files and evaluation at points. :data:`FIELDS` has the name, definition, unit,
+sign and components of each field. A user-defined field is a function of :class:`Values`, or a
+:class:`Field` made from one."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-"""Section forces of a beam from the internal forces of its elements.
-
-The internal force of an element does no work in a rigid motion. With the loads on the element it is
-therefore in exact equilibrium, whatever the error of the displacement. Equilibrium of the part of
-the element between a node and a section gives the section force and moment.
-"""
+"""Section forces of a beam from the internal forces of its elements. The internal force of an
+element does no work in a rigid motion. With the loads on the element it is therefore in exact
+equilibrium, whatever the error of the displacement. Equilibrium of the part of the element between
+a node and a section gives the section force and moment."""
 
 from __future__ import annotations
 

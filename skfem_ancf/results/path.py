@@ -112,11 +112,8 @@ class Path(MaterialPoints):
         return np.array([c.load for c in self.critical_points if c.kind == "limit"])
 
     def bifurcation_points(self) -> Array:
-        """Load factors at bifurcations, in the order of the path.
-
-        :attr:`critical_points` has their states and modes; ``scene.continuation(branch=...)`` with
-        one of them follows the branch.
-        """
+        """Load factors at bifurcations, in the order of the path. :attr:`critical_points` has their
+        states and modes; ``scene.continuation(branch=...)`` with one of them follows the branch."""
         return np.array([c.load for c in self.critical_points if c.kind == "bifurcation"])
 
     plot = plot_path

@@ -376,11 +376,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
 
     @property
     def verdict(self) -> Verdict | None:
-        """Stability of an equilibrium, a :class:`~skfem_ancf.equations.stability.Verdict`.
-
-        None for an instant of a motion, and for a linear solution, for which ``scene.buckling()``
-        gives the critical load.
-        """
+        """Stability of an equilibrium, a :class:`~skfem_ancf.equations.stability.Verdict`. None for
+        an instant of a motion, and for a linear solution, for which ``scene.buckling()`` gives the
+        critical load."""
         if self._verdict is None and self.t is None and self.base is None:
             self._verdict = verdict(self._equations, np.array(self.u), self.load, self.multipliers)
         return self._verdict
@@ -388,16 +386,13 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     @property
     def stability(self) -> str | None:
         """"stable", "unstable" or "singular" (to round-off); "undecided" is possible with loads
-        that have no potential, see ``state.verdict.note``. None where :attr:`verdict` is.
-        """
+        that have no potential, see ``state.verdict.note``. None where :attr:`verdict` is."""
         return None if self.verdict is None else self.verdict.stability
 
     @property
     def negative_pivots(self) -> int | None:
-        """Number of unstable directions: negative eigenvalues of the constrained tangent.
-
-        None where :attr:`verdict` is.
-        """
+        """Number of unstable directions: negative eigenvalues of the constrained tangent. None
+        where :attr:`verdict` is."""
         return None if self.verdict is None else self.verdict.negative_pivots
 
     @cached_property
@@ -531,10 +526,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     # recovered fields
 
     def recovery(self, beam: WhichBeam = None) -> Recovery | None:
-        """The recovered field of a beam, a :class:`~skfem_ancf.recovery.recovered.Recovery`.
-
-        None where the field cannot be recovered; :attr:`recovered` has the reason.
-        """
+        """The recovered field of a beam, a :class:`~skfem_ancf.recovery.recovered.Recovery`. None
+        where the field cannot be recovered; :attr:`recovered` has the reason."""
         return self._recovery_of(self.beams.index(select_beam(self.beams, beam)))
 
     def _recovery_of(self, k, fields=True):
@@ -625,10 +618,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     @property
     def recovered(self) -> dict[Any, str]:
         """For each beam, by name or number, "" if its fields are recovered, else the reason: dict.
-
         Recovery needs an equilibrium, static or dynamic, and known distributions of loads.
-        Otherwise strain and stress are those of the elements.
-        """
+        Otherwise strain and stress are those of the elements."""
         out = {}
         for k, beam in enumerate(self.beams):
             self._recovery_of(k)
@@ -747,11 +738,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
 
     @property
     def strain_energy(self) -> float:
-        """Strain energy of the scene.
-
-        It is W(E) of the total strain, also under temperatures and eigenstrains E0: the field
-        "energy" is W(E - E0), and the difference is the potential of these loads.
-        """
+        """Strain energy of the scene. It is W(E) of the total strain, also under temperatures and
+        eigenstrains E0: the field "energy" is W(E - E0), and the difference is the potential of
+        these loads."""
         if self.base is not None:
             return linear_energy(self._equations, self.base.u, self.u - self.base.u, self.load)
         return self._equations.strain_energy(self.u, self._time)

@@ -162,9 +162,7 @@ class LoadCases(Mapping):
 
     def reactions(self) -> dict[str, dict[str, Array]]:
         """Reactions of all combinations by the place of each support: along x, y, and moment, (3,).
-
-        The names "least" and "greatest" have the extremes of each component.
-        """
+        The names "least" and "greatest" have the extremes of each component."""
         found: dict[str, dict[str, Array]] = {}
         for name, state in self.items():
             for place, force in supports_of(state):
@@ -176,11 +174,8 @@ class LoadCases(Mapping):
 
     def table(self) -> list[dict[str, Any]]:
         """Extremes of each combination, a row each, and of all in the last: for
-        ``pandas.DataFrame``.
-
-        Columns are the largest displacement and utilisation, and least and greatest N, Q and M over
-        all beams.
-        """
+        ``pandas.DataFrame``. Columns are the largest displacement and utilisation, and least and
+        greatest N, Q and M over all beams."""
         rows = []
         for name, state in self.items():
             row: dict[str, Any] = {"combination": name}

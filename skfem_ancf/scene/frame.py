@@ -392,11 +392,9 @@ class Frame(Scene):
             raise InputError(f"all lines are hinged at node {loose[0]}: {advice}")
 
     def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
-        """Fix positions and rotations of nodes, see :meth:`nodes`; hinged lines stay hinged.
-
-        The rotation is that of the best-fit line of a section, which may warp and change its
-        thickness. ``beam`` is None and ``thickness`` "free" for a frame.
-        """
+        """Fix positions and rotations of nodes, see :meth:`nodes`; hinged lines stay hinged. The
+        rotation is that of the best-fit line of a section, which may warp and change its thickness.
+        ``beam`` is None and ``thickness`` "free" for a frame."""
         _no_beam(beam)
         require_option("thickness at the nodes of a frame", thickness, ("free",))
         return self._hold(boundary, COMPONENTS)
@@ -410,11 +408,9 @@ class Frame(Scene):
 
     def point_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                     amplitude: TimeFunction = None) -> Frame:
-        """A dead force on each of some nodes, see :meth:`nodes`, or on a material point.
-
-        A point (x, y) may lie between nodes, with or without ``beam``; or ``at`` is a function of
-        time that returns such points, with ``beam``.
-        """
+        """A dead force on each of some nodes, see :meth:`nodes`, or on a material point. A point
+        (x, y) may lie between nodes, with or without ``beam``; or ``at`` is a function of time that
+        returns such points, with ``beam``."""
         require_unmasked("at", at)
         if beam is not None or (  # a point of a line between nodes
                 is_point(at) and not isinstance(at, list)
@@ -440,10 +436,8 @@ class Frame(Scene):
 
     def follower_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                        amplitude: TimeFunction = None, line: int | None = None) -> Frame:
-        """A force that rotates with a line: a :class:`~skfem_ancf.FollowerForce`.
-
-        ``line`` is the number of the line whose tangent is used, where several meet.
-        """
+        """A force that rotates with a line: a :class:`~skfem_ancf.FollowerForce`. ``line`` is the
+        number of the line whose tangent is used, where several meet."""
         points = self.system.points
         if line is not None:
             beam, line = points.chain_of(line, beam)
@@ -454,10 +448,8 @@ class Frame(Scene):
 
     def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
                   amplitude: TimeFunction = None) -> Frame:
-        """A dead force per length of the axis of lines.
-
-        ``beam`` may also be the name of a set of lines of the mesh.
-        """
+        """A dead force per length of the axis of lines. ``beam`` may also be the name of a set of
+        lines of the mesh."""
         known = [b.name for b in self.beams]
         if not isinstance(beam, str) or beam in known or beam not in self.graph.groups:
             super().line_load(force, beam, amplitude)
@@ -481,10 +473,8 @@ class Frame(Scene):
     # results
 
     def rotations(self, state: State) -> Array:
-        """Rotations of the nodes in (-pi, pi], shape (n,); NaN where all lines are hinged.
-
-        For a linear solution they are linear.
-        """
+        """Rotations of the nodes in (-pi, pi], shape (n,); NaN where all lines are hinged. For a
+        linear solution they are linear."""
         joint: Any = self.joints[0]
         u = displacement(self.system, state, "state")
         out = np.full(self.points.shape[1], np.nan)

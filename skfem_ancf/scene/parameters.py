@@ -250,11 +250,9 @@ class Parameters:
         return {"material.E" if one.name == "E" else one.name: field}
 
     def groups(self, size: int) -> list[tuple[list[int], Array]]:
-        """Parameters that change different rows, and the parameter of each of ``size`` rows.
-
-        Rows are those of degrees of freedom and of joints, for which it is not known (-1). A
-        component of a field acts on the nodes of its elements: each third one at once.
-        """
+        """Parameters that change different rows, and the parameter of each of ``size`` rows. Rows
+        are those of degrees of freedom and of joints, for which it is not known (-1). A component
+        of a field acts on the nodes of its elements: each third one at once."""
         out = []
         for one in self.each:
             first, n = one.at.start, one.start.size

@@ -238,9 +238,7 @@ class Across(Immutable):
     @cached_property
     def jumps(self) -> Array:
         """Elements that begin with a jump of width, E, density, slope of the height or curvature.
-
-        See :func:`~.across.jumps`.
-        """
+        See :func:`~.across.jumps`."""
         n, found = self.mesh.nelements, [np.zeros(0)]
         for layer in self.layers:
             eta = np.linspace(layer.measure.low, layer.measure.high, POINTS + 1)
@@ -373,9 +371,7 @@ class Across(Immutable):
 
     def ends(self, xi: Array | None = None) -> Array:
         """Ends of the intervals of one law and smooth width, bottom to top, (npieces + 1, ...).
-
-        They are evaluated at axial coordinates xi (npoints,), or at the largest height for None.
-        """
+        They are evaluated at axial coordinates xi (npoints,), or at the largest height for None."""
         found = [layer.measure.highest if xi is None else self._ends(layer, xi)
                  for layer in self.layers]
         return np.concatenate([found[0][:1], *(end[1:] for end in found)])
@@ -464,10 +460,8 @@ class Across(Immutable):
         return float(np.sum(soft) / np.sum(soft / chebval(z, factor)))
 
     def stabilisation(self, formulation: Any) -> Array | None:
-        """Stabilisation matrix of a formulation, (1 or nelements, 2 nb, 2 nb), or None.
-
-        It is computed for unit width and the largest height, and is proportional to the width.
-        """
+        """Stabilisation matrix of a formulation, (1 or nelements, 2 nb, 2 nb), or None. It is
+        computed for unit width and the largest height, and is proportional to the width."""
         first = self.layers[0]
         K = formulation.stabilisation(self.mesh, self.element, first.material, 1.0)
         if K is None:

@@ -1,9 +1,7 @@
-"""Rolled and hollow sections by their standard names, with root radii and tapered flanges.
-
-Sizes in millimetres are those of EN 10365 (IPE, HEA, HEB, UPN), EN 10056-1 (equal angles, L) and
-EN 10055 (T). Radii of hollow sections are those of EN 10210-2 (hot finished) and EN 10219-2 (cold
-formed), which set them for the calculation of properties.
-"""
+"""Rolled and hollow sections by their standard names, with root radii and tapered flanges. Sizes in
+millimetres are those of EN 10365 (IPE, HEA, HEB, UPN), EN 10056-1 (equal angles, L) and EN 10055
+(T). Radii of hollow sections are those of EN 10210-2 (hot finished) and EN 10219-2 (cold formed),
+which set them for the calculation of properties."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
-"""Sections: rectangles, bonded layers, profiles, and sections given by stiffnesses.
-
-A section is a list of layers from bottom to top, each with a material, a width, and a measure
-b(Y) dY, fixed or moving, whose Gauss rules integrate across it.
-"""
+"""Sections: rectangles, bonded layers, profiles, and sections given by stiffnesses. A section is a
+list of layers from bottom to top, each with a material, a width, and a measure b(Y) dY, fixed or
+moving, whose Gauss rules integrate across it."""
 
 from __future__ import annotations
 

@@ -332,10 +332,8 @@ class Explorer:
         return f"<Explorer at {shown(self.value)}: {self.state!r}>"
 
     def set(self, value: Any) -> Any:
-        """Solve for a number or a force, and update the body; returns the State.
-
-        Without an equilibrium the body does not move, and the picture shows a message.
-        """
+        """Solve for a number or a force, and update the body; returns the State. Without an
+        equilibrium the body does not move, and the picture shows a message."""
         try:
             state = self._solve(value, self.state)
         except (ConvergenceError, SupportError):

@@ -1,7 +1,5 @@
-"""Active set: a broad search by elements, then closest point projection of their points.
-
-The search compares the gap of the middle of each element with the radius of its points.
-"""
+"""Active set: a broad search by elements, then closest point projection of their points. The search
+compares the gap of the middle of each element with the radius of its points."""
 
 import numpy as np
 

@@ -336,7 +336,6 @@ class Contacts:
         return carried(self.pose(which, t, False), points)
 
     def require_path(self) -> None:
-        """Raise InputError if the obstacles do not allow arc-length continuation."""
         for one in self.obstacles:
             if one.friction > 0.0 or one.moves or one.method != "penalty":
                 raise InputError(f"continuation knows obstacles that rest, without friction and by "
@@ -354,7 +353,6 @@ class Contacts:
                    "GeneralizedAlpha(0), or method='penalty'", scheme, one, reason)
 
     def require_free(self, u: Array, what: str, instead: str) -> None:
-        """Raise InputError if a linear solution penetrates an obstacle."""
         refuse(any(gap.min() < 0.0 for _, _, gap in self.look(u, 1.0)), "{} knows no contact, and "
                "its solution enters an obstacle: use {}", what, instead)
 

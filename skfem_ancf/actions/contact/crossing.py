@@ -1,10 +1,7 @@
-"""Detection of steps in which bodies pass through an obstacle (tunnelling).
-
-The gap changes by no more than the path length. A point with path length w and gaps g_0 and g_1 at
-the ends has been no deeper than ``(w - g_0 - g_1) / 2``, which excludes most points. The others
-have crossed the obstacle if they are deeper on the path than at both ends, and on another side at
-its end.
-"""
+"""Detection of steps in which bodies pass through an obstacle (tunnelling). The gap changes by no
+more than the path length. A point with path length w and gaps g_0 and g_1 at the ends has been no
+deeper than ``(w - g_0 - g_1) / 2``, which excludes most points. The others have crossed the
+obstacle if they are deeper on the path than at both ends, and on another side at its end."""
 
 from __future__ import annotations
 
@@ -59,7 +56,6 @@ class CrossingGuard:
         return ""
 
     def begin(self) -> None:
-        """Forget earlier results."""
         for path in self._paths:
             path.deepest = 0.0
 

@@ -1,9 +1,7 @@
-"""Surface points of beams and their gap, the signed distance from an obstacle.
-
-A surface point is ``X = x + c n(s)``: a point x of the body, and for cables the normal n of the
-slope s of the axis at a distance c. The gap is negative inside the obstacle; its gradient is the
-normal at the closest point.
-"""
+"""Surface points of beams and their gap, the signed distance from an obstacle. A surface point is
+``X = x + c n(s)``: a point x of the body, and for cables the normal n of the slope s of the axis at
+a distance c. The gap is negative inside the obstacle; its gradient is the normal at the closest
+point."""
 
 import numpy as np
 

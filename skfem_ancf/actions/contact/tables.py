@@ -1,8 +1,6 @@
-"""Tables of the contact kernels: surface points, obstacles, and history data.
-
-A contact pair is the surface of one beam with one obstacle. Its arrays are consecutive parts of
-those in :class:`ContactTables`; :func:`pair_of` returns views with names.
-"""
+"""Tables of the contact kernels: surface points, obstacles, and history data. A contact pair is the
+surface of one beam with one obstacle. Its arrays are consecutive parts of those in
+:class:`ContactTables`; :func:`pair_of` returns views with names."""
 
 from typing import Annotated, NamedTuple, TypeAlias
 

@@ -1,10 +1,8 @@
-"""Tables of springs, foundations and drag, and kernels of their forces and derivatives.
-
-An element has vectors that are affine in the degrees of freedom: positions, their differences,
-directions of sections. Elements of the kinds below have two, ``d`` and ``e``: four numbers, the
-rows of arrays (4, n), with elements of one kind side by side. Vectors of user-defined elements
-follow in the same array. Forces are resisting, as internal forces.
-"""
+"""Tables of springs, foundations and drag, and kernels of their forces and derivatives. An element
+has vectors that are affine in the degrees of freedom: positions, their differences, directions of
+sections. Elements of the kinds below have two, ``d`` and ``e``: four numbers, the rows of arrays
+(4, n), with elements of one kind side by side. Vectors of user-defined elements follow in the same
+array. Forces are resisting, as internal forces."""
 
 from typing import Annotated, NamedTuple
 
@@ -114,7 +112,6 @@ def turns_of(tables):
 
 @source
 def run_kinds(tables, what, y, w, factor, out):
-    """As :func:`of_kinds`, for all kinds of the tables."""
     if tables.number > 0:
         kinds = Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
         of_kinds(kinds, what, y, w, factor, out)
@@ -171,7 +168,6 @@ def add_resisting_force(tables, t, u, v, f):
 
 @apart("contacts", ContactTables, Annotated[Question, MADE], F1, F1, F1)
 def add_contact(contacts, asked, u, v, out):
-    """Add the answer of obstacles to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     if contacts.moving > 0:
         call_custom(POSES, contacts.custom, np.int64(0), asked.t, asked.span, contacts.poses,
                     contacts.poses, contacts.poses)
@@ -184,7 +180,6 @@ def add_contact(contacts, asked, u, v, out):
 
 @source
 def _at(what, t):
-    """A question at one time."""
     return Question(what, t, 0.0, 0.0, NONE, NONE)
 
 
@@ -234,7 +229,6 @@ def contact_along(tables, t, u, du, out):
 
 @source
 def set_contact_rate(tables, dt):
-    """Pass the time step to obstacles."""
     tables.contacts.memory[RATE] = 1.0 / (dt * dt)
 
 

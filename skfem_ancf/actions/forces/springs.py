@@ -57,7 +57,6 @@ class Law:
             f"the potential of {name}", pair[1], what)
 
     def __call__(self, s: float) -> float:
-        """The force at s."""
         return ask_number(f"{self.name}({self.of} = {{:g}})", self.function, float(s))
 
     def potential(self, s: float) -> float:
@@ -173,10 +172,8 @@ def end_of(layout: Layout, place: Any) -> Vector:
 
 
 class ElasticElement(ForceElement):
-    """A force ``k(q) + damping(dq / dt)`` against a coordinate q, an elongation or an angle.
-
-    A subclass defines :meth:`coordinate` and :meth:`mean_slope`.
-    """
+    """A force ``k(q) + damping(dq / dt)`` against a coordinate q, an elongation or an angle. A
+    subclass defines :meth:`coordinate` and :meth:`mean_slope`."""
 
     k: Proportional | Law
     damping: Proportional | Law

@@ -1,10 +1,8 @@
-"""Surfaces of beams, rigid bodies and domains: facets, which are polynomial curves.
-
-Plane vectors are complex numbers. Point ``zeta`` in [-1, 1] of a facet is at
-``c(zeta) = start(zeta) + sum(weights(zeta) * z[dofs])``, where z are the displacements of pairs of
-degrees of freedom. Its outer normal is ``side * 1j * c' / |c'|``, and the surface is at ``offset``
-along it: half the height for a cable, whose curve is its axis, else 0.
-"""
+"""Surfaces of beams, rigid bodies and domains: facets, which are polynomial curves. Plane vectors
+are complex numbers. Point ``zeta`` in [-1, 1] of a facet is at ``c(zeta) = start(zeta) +
+sum(weights(zeta) * z[dofs])``, where z are the displacements of pairs of degrees of freedom. Its
+outer normal is ``side * 1j * c' / |c'|``, and the surface is at ``offset`` along it: half the
+height for a cable, whose curve is its axis, else 0."""
 
 from __future__ import annotations
 

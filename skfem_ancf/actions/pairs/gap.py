@@ -60,12 +60,10 @@ def _times(c, w):
 
 
 def dot(a: Array, b: Array) -> Array:
-    """The scalar product of plane vectors."""
     return np.real(np.conj(a) * b)
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Their product ``a_1 b_2 - a_2 b_1``."""
     return np.imag(np.conj(a) * b)
 
 

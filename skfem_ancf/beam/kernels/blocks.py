@@ -1,12 +1,9 @@
-"""Pieces of the compiled kernels of :mod:`.loops`, for a block of elements.
-
-t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``first`` is the number of the
-first element. Arrays have the elements last: unknowns U and forces F (m, 2 W); rows r, their change
-d and forces B (rows, 2 W); directions X; strains E and stresses T (ns, W).
-
-Loops over elements end at ``t.width``, which is W: LLVM unrolls those whose length it knows, which
-prevents vectors. So do too many arrays in one loop, whose addresses it compares.
-"""
+"""Pieces of the compiled kernels of :mod:`.loops`, for a block of elements. t are
+:class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``first`` is the number of the first
+element. Arrays have the elements last: unknowns U and forces F (m, 2 W); rows r, their change d and
+forces B (rows, 2 W); directions X; strains E and stresses T (ns, W). Loops over elements end at
+``t.width``, which is W: LLVM unrolls those whose length it knows, which prevents vectors. So do too
+many arrays in one loop, whose addresses it compares."""
 
 import numpy as np
 
@@ -38,7 +35,6 @@ def gather(t, first, u, U):
 
 @source
 def multiply(C, X):
-    """X *= C for all components."""
     for s in range(len(X)):
         c, x = C[s], X[s]
         for i in range(0, len(x), len(c)):
@@ -194,7 +190,6 @@ def changes(t, X, d, E):
 
 @source
 def add(c, X, Y):
-    """Y += c X."""
     for s in range(len(Y)):
         x, y = X[s], Y[s]
         for e in range(len(y)):
@@ -206,7 +201,6 @@ def add(c, X, Y):
 
 @apart("StrainTables", I2, F2, F2, F2)
 def times(pairs, H, E, T):
-    """T = H E."""
     T[:] = 0.0
     for q in range(len(H)):
         s, t, h = pairs[0, q], pairs[1, q], H[q]

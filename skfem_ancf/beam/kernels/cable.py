@@ -1,13 +1,9 @@
-"""Tables of the shear-rigid cable.
-
-``U = 1/2 int E A eps^2 - 2 E S eps k + E I k^2 ds`` with ``eps = |r'| - 1``, the change ``k`` of
-the material curvature ``kappa = r' x r'' / |r'|^2`` (rotation of the tangent per reference length),
-and the first moment S of the section about the axis. Both are sampled at 2 m - 2 Gauss points for
-an axis of degree 2 m - 1. Those of the cubic axis miss a mode (equal axial slopes at both nodes),
-which gets a third point in the middle with a weight that decreases with the slenderness.
-
-Rows are d/dX and d^2/dX^2 at each point.
-"""
+"""Tables of the shear-rigid cable. ``U = 1/2 int E A eps^2 - 2 E S eps k + E I k^2 ds`` with ``eps
+= |r'| - 1``, the change ``k`` of the material curvature ``kappa = r' x r'' / |r'|^2`` (rotation of
+the tangent per reference length), and the first moment S of the section about the axis. Both are
+sampled at 2 m - 2 Gauss points for an axis of degree 2 m - 1. Those of the cubic axis miss a mode
+(equal axial slopes at both nodes), which gets a third point in the middle with a weight that
+decreases with the slenderness. Rows are d/dX and d^2/dX^2 at each point."""
 
 from __future__ import annotations
 
@@ -175,7 +171,6 @@ class CableKernel(ElementKernel):
 
     @property
     def volume(self) -> float:
-        """Volume of the body."""
         w, area = self._rule[1], self._across.moments(self.points, what="area")[0]
         return float(area @ w @ self._across.mesh.lengths)
 

@@ -1,10 +1,7 @@
-"""Tables of elements for compiled kernels.
-
-Elements are the last axis of arrays, :data:`W` together, so that loops over them have a constant
-length. Rows, strains and stresses are scaled in each element such that few tables are needed: with
-derivatives ``G[e] = R[e] G D[e]`` and diagonal R and D (graded meshes, arcs), rows are ``R^-1 r``
-and unknowns ``D U``.
-"""
+"""Tables of elements for compiled kernels. Elements are the last axis of arrays, :data:`W`
+together, so that loops over them have a constant length. Rows, strains and stresses are scaled in
+each element such that few tables are needed: with derivatives ``G[e] = R[e] G D[e]`` and diagonal R
+and D (graded meshes, arcs), rows are ``R^-1 r`` and unknowns ``D U``."""
 
 from functools import lru_cache
 from typing import NamedTuple

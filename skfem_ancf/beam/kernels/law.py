@@ -54,7 +54,6 @@ def point_of(law: LawTables) -> Any:
 
 
 def material_of(law: LawTables) -> Any:
-    """The material of a law that is not linear."""
     return _LAWS[law.handle]
 
 

@@ -1,8 +1,6 @@
-"""Compiled kernels: the functions of :mod:`.runs` as loops over blocks of elements.
-
-t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and ``out`` are stresses
-(ne ns,), or of size 0. Other arrays are as in :mod:`.blocks`.
-"""
+"""Compiled kernels: the functions of :mod:`.runs` as loops over blocks of elements. t are
+:class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and ``out`` are stresses (ne
+ns,), or of size 0. Other arrays are as in :mod:`.blocks`."""
 
 import numpy as np
 
@@ -107,7 +105,6 @@ def run_viscous(t, u, v, f):
 
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1, int)
 def run_tangent(t, u, given, out, f, A, ld):
-    """Tangent, force and stresses at u; the geometric part has the given stresses, if any."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
     U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
@@ -135,7 +132,6 @@ def run_tangent(t, u, given, out, f, A, ld):
 
 @apart("unsymmetric", CompiledTables, F1, F1, F1, int)
 def run_unsymmetric(t, u, v, A, ld):
-    """Add ``B(u)^T H (B(v) - B(u))`` to a matrix, entry (i, j) at ``A[j * ld + i - j]``."""
     R, m, ns, n = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], 3 * t.G.shape[0] // 2
     du = v.copy()
     add_multiple(-1.0, u, du)
@@ -205,7 +201,6 @@ def add_unsymmetric(start, first, ld, m, K, Z, A):
 
 @apart("gradients", CompiledTables, F1, F1)
 def run_gradients(t, u, out):
-    """Write the derivatives of strains and of weighted stresses, (2, ne, ns, 2 nb)."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     both = out.reshape(2, len(t.start), ns, 2 * m + 2)
     U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
@@ -328,7 +323,6 @@ def run_eigen_mean(t, u, v, given, f):
 
 @apart("eigenstrains", CompiledTables, F1, F1, F1, int)
 def run_eigen_tangent(t, u, given, A, ld):
-    """Change of the tangent at u by eigenstrains: stresses for linear laws, else strains."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
     E, T = np.empty((ns, t.width)), np.empty((ns, t.width))
@@ -367,7 +361,6 @@ def run_put(t, given):
 
 @source
 def add_changes(B, start, x, T):
-    """Add ``B[e] x`` at start[e] to T (ne ns,), with B repeated for copies of the elements."""
     k, ns, n = B.shape
     for e in range(len(start)):
         for s in range(ns):
@@ -379,7 +372,6 @@ def add_changes(B, start, x, T):
 
 @source
 def add_transposed(B, start, T, f):
-    """Add ``B[e]^T T[e]`` at start[e] to f, with B repeated for copies."""
     k, ns, n = B.shape
     for e in range(len(start)):
         for s in range(ns):

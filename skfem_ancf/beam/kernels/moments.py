@@ -93,7 +93,6 @@ def add_mean_moments(moments, factors, u0, u1, f):
 
 @source
 def _add_force(moments, k, x, y, f):
-    """Add a force on the direction of moment k."""
     for i in range(moments.c.shape[1]):
         f[moments.dofs[k, 0, i]] += moments.c[k, i] * x
         f[moments.dofs[k, 1, i]] += moments.c[k, i] * y

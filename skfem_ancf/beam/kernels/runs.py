@@ -1,11 +1,8 @@
-"""Kernels of :class:`~skfem_ancf.beam.kernels.elements.Elements`.
-
-Displacements u are (N,); f (N,) and ``flat`` are added to. Stresses are weighted, flat, (ne, ns);
-``flat, ld`` store entry (i, j), i >= j, of a tangent at ``flat[j * ld + i - j]``. Forces and
-tangents of the strain include the constant stiffness. Arrays of size 0 are not used.
-
-In compiled code the functions of the same names in :mod:`.loops` replace them.
-"""
+"""Kernels of :class:`~skfem_ancf.beam.kernels.elements.Elements`. Displacements u are (N,); f (N,)
+and ``flat`` are added to. Stresses are weighted, flat, (ne, ns); ``flat, ld`` store entry (i, j), i
+>= j, of a tangent at ``flat[j * ld + i - j]``. Forces and tangents of the strain include the
+constant stiffness. Arrays of size 0 are not used. In compiled code the functions of the same names
+in :mod:`.loops` replace them."""
 
 import numpy as np
 
@@ -38,14 +35,12 @@ def _mean(e, u, v):
 
 @kernel
 def run_force(e, u, f):
-    """The force at u."""
     U, d, one = e.at(u)
     e.add(e.force(e.directions(one, one), e.stress(e.strain(d, one)), U), f)
 
 
 @kernel
 def run_stress(e, u, out):
-    """Write the stresses at u."""
     _, d, one = e.at(u)
     _put(e, e.stress(e.strain(d, one)), out)
 

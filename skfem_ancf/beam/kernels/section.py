@@ -1,7 +1,5 @@
-"""Tables of beams with sections: Green-Lagrange strains, sampled as the formulation says.
-
-Rows are d/dX, then d/dY, at the points of the samples.
-"""
+"""Tables of beams with sections: Green-Lagrange strains, sampled as the formulation says. Rows are
+d/dX, then d/dY, at the points of the samples."""
 
 from __future__ import annotations
 
@@ -86,7 +84,6 @@ class SectionKernel(ElementKernel):
 
     @property
     def volume(self) -> float:
-        """Volume of the body."""
         return sum(float(np.sum(one.volumes)) * (self.t.shape[1] // len(one.volumes))
                    for one in self.firsts)
 

@@ -92,17 +92,14 @@ class StrainTables(NamedTuple):
 
     @property
     def kind(self) -> int:
-        """SECTION or CABLE."""
         return self.pattern.kind
 
     @property
     def rows(self) -> Array:
-        """Rows g and h of each sample, (2, ns)."""
         return self.pattern.rows
 
     @property
     def pairs(self) -> Array:
-        """Samples s <= t of each modulus, (2, nq)."""
         return self.pattern.pairs
 
 
