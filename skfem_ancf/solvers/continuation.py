@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 
 from ..core import (Array, CallbackError, ConvergenceError, Interrupted, ask, refuse,
                     require_function, require_integer, require_positive, shown)
@@ -390,34 +391,29 @@ def _between(tracer, p, q, tol):
             if not turns or (not single and abs(change) != 1):
                 out.append(("bifurcation", _bifurcation(tracer, p, a, b, tol), change))
             continue
-        middle = _at(tracer, p, 0.5 * (a.arc + b.arc), b)
+        middle = _at(tracer, p, 0.5 * (a.arc + b.arc))
         stack += [(middle, b, depth + 1), (a, middle, depth + 1)]
     return out
 
 
-def _at(tracer, p, arc, b):
-    """The point at an arc length after p, or b."""
-    return b if arc >= b.arc else tracer.set_tangent(tracer.advance(p, arc - p.arc), p)
+def _at(tracer, p, arc):
+    """The point at an arc length after p."""
+    return tracer.set_tangent(tracer.advance(p, arc - p.arc), p)
 
 
 def _limit(tracer, p, a, b, tol):
-    """The limit point between a and b, by the Illinois method for the rate of the load."""
-    end = tol * (b.arc - p.arc)
-    low, high, f, g, best = a, b, a.rate, b.rate, b
-    for _ in range(100):
-        x = (low.arc * g - high.arc * f) / (g - f)
-        best = _at(tracer, p, min(max(x, low.arc + 0.01 * end), high.arc - 0.01 * end), b)
-        # parabola of the load, with the second derivative from the rates at both ends
-        gap = 0.5 * best.rate**2 * (b.arc - a.arc) / abs(b.rate - a.rate)
-        if gap <= 0.1 * tol * abs(best.load):
-            break
-        if f * best.rate > 0:
-            moved, low, f, g = best.arc - low.arc, best, best.rate, 0.5 * g
-        else:
-            moved, high, g, f = high.arc - best.arc, best, best.rate, 0.5 * f
-        if min(moved, high.arc - low.arc) <= end:
-            break
-    return replace(best, iterations=0, negative=a.negative)
+    """The limit point between a and b: the root of the rate of the load by the arc length."""
+    known = {a.arc: a, b.arc: b}
+
+    def rate(arc):
+        if arc not in known:
+            known[arc] = _at(tracer, p, arc)
+        return known[arc].rate
+
+    # a parabola of the load, with the second derivative from the rates at both ends
+    near = np.sqrt(2e-3 * tol * abs(b.load) * (b.arc - a.arc) / abs(b.rate - a.rate))
+    arc = scipy.optimize.brentq(rate, a.arc, b.arc, xtol=max(near, tol * (b.arc - p.arc)))
+    return replace(known[arc], iterations=0, negative=a.negative)
 
 
 def _bifurcation(tracer, p, a, b, tol):
@@ -433,7 +429,7 @@ def _bifurcation(tracer, p, a, b, tol):
             # overshoot slightly, so that both ends converge
             guess += np.sign(x - guess) * 0.1 * min(guess - low.arc, high.arc - guess)
             x = guess
-        best = _at(tracer, p, x, b)
+        best = _at(tracer, p, x)
         mode, value = _smallest(tracer, best, mode)
         values[best.arc] = value
         low, high = (best, high) if best.negative == a.negative else (low, best)
