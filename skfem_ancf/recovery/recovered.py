@@ -40,8 +40,8 @@ from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from ..mesh.numbering import by_element
 from ..sections.across import SIDE, off_ends
-from .section_forces import (ArcLength, Intervals, NotFound, NotRecovered, SectionForces, Sections,
-                             Together)
+from .section_forces import (ArcLength, NotFound, NotRecovered, SectionForces, Sections, Together,
+                             intervals_of)
 
 #: Largest relative change of the strain in the last round, and strain that is round-off.
 UNSETTLED, TINY = 0.01, 1e-12
@@ -69,6 +69,16 @@ BALANCE, BALANCE_AT_END = 2, 10
 INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 
 
+def _by_rows(function):
+    """A linear function of real values (n, k) as one of (..., n, m), which may be complex."""
+    def applied(self, values):
+        rows = np.ascontiguousarray(values.swapaxes(0, -2))
+        found = function(self, rows.reshape(len(rows), -1).view(float))
+        return np.ascontiguousarray(found).view(rows.dtype).reshape(rows.shape).swapaxes(0, -2)
+
+    return applied
+
+
 class SectionsAlong:
     """Operators on values at n >= 3 sections of arc lengths s (n,), for values (..., n, m).
     Derivative and integral are those of the cubic spline through the values, whose third derivative
@@ -90,9 +100,10 @@ class SectionsAlong:
         self._w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
         self._smooth = dpttrf(self._w + np.append(c, 0.0) + np.append(0.0, c), -c)[:-1]
 
-    def d_ds(self, values: Array) -> Array:
+    @_by_rows
+    def d_ds(self, y: Array) -> Array:
         """Axial derivative."""
-        d, y = self.d[:, None], _rows(values)
+        d = self.d[:, None]
         b, slope = np.empty_like(y), (y[1:] - y[:-1]) / d
         b[1:-1] = 3.0 * (d[1:] * slope[:-1] + d[:-1] * slope[1:])
         if len(d) == 2:
@@ -102,7 +113,7 @@ class SectionsAlong:
                 both = d[first] + d[second]
                 b[end] = ((d[first] + 2.0 * both) * d[second] * slope[first]
                           + d[first]**2 * slope[second]) / both
-        return _back(dgttrs(*self._slopes, b)[0], values)
+        return dgttrs(*self._slopes, b)[0]
 
     def integral(self, values: Array) -> Array:
         """Integral from the first section, of values (..., n)."""
@@ -113,21 +124,10 @@ class SectionsAlong:
         np.cumsum(parts, axis=-1, out=out[..., 1:])
         return out
 
-    def smoothed(self, values: Array) -> Array:
-        """Solution f of ``f - smoothing^2 f'' = values`` with f' = 0 at both ends."""
-        return _back(dpttrs(*self._smooth, self._w[:, None] * _rows(values))[0], values)
-
-
-def _rows(values: Array) -> Array:
-    """Values (..., n, m) as floats, one row for each section."""
-    rows = np.ascontiguousarray(values.swapaxes(0, -2))
-    return rows.reshape(values.shape[-2], -1).view(float)
-
-
-def _back(rows: Array, like: Any) -> Array:
-    """The values of :func:`_rows`."""
-    shape = like.swapaxes(0, -2).shape
-    return np.ascontiguousarray(rows).view(like.dtype).reshape(shape).swapaxes(0, -2)
+    @_by_rows
+    def smoothed(self, y: Array) -> Array:
+        """Solution f of ``f - smoothing^2 f'' = y`` with f' = 0 at both ends."""
+        return dpttrs(*self._smooth, self._w[:, None] * y)[0]
 
 
 class Segment:
@@ -237,11 +237,13 @@ class Segment:
 
     def from_axis(self, values: Array) -> Array:
         """Integral from the axis to each point of values (..., n, m)."""
-        return _times(self.span * values, self._till)
+        values = self.span * values
+        return values @ self._till if self._till.ndim == 2 else (
+            values[..., None, :] @ self._till)[..., 0, :]
 
     def at_axis(self, values: Array) -> Array:
         """Values (..., n, m) on the axis, (..., n)."""
-        return _times(values, self.points.axis[..., None])[..., 0]
+        return (values * self.points.axis).sum(axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """Integral from the axis of the axial derivative at constant distance from it, for values
@@ -424,11 +426,6 @@ class Segment:
 DIVERGED = "the strain is too large: no equilibrium of the section was found"
 
 
-def _times(values, A):
-    """Rows (..., n, m) times a matrix (m, k), or one of each section, (n, m, k)."""
-    return values @ A if A.ndim == 2 else (values[..., None, :] @ A)[..., 0, :]
-
-
 def _arcsin(x):
     return np.arcsin(np.minimum(np.maximum(x, -1.0), 1.0))
 
@@ -466,13 +463,6 @@ def strain_of_stress(law: Law, stress: Array, strain: Array,
     raise NotFound("no strain has the stress of the section under this law")
 
 
-def _axial(law, strain):
-    """dS_xx / deps_xx at constant S_yy and S_xy, shape (...), for strains (3, ...)."""
-    C = law.compliance((0, 1, 2)) if isinstance(law, LinearLaw) else np.linalg.inv(
-        np.moveaxis(law.moduli(strain), (0, 1), (-2, -1)))
-    return 0.0 * strain[0] + 1.0 / C[..., 0, 0]
-
-
 class Recovery:
     """The recovered fields of one beam, a :class:`Segment` between cuts; ``why`` they are not
     there."""
@@ -488,7 +478,8 @@ class Recovery:
         if forces.pressed:
             self.why = ("an obstacle touches it, at points: pressure between them is not known; "
                         "State.resultants() has the section forces")
-        self.intervals = Intervals(layers, beam.element.order)
+        self.intervals = intervals_of(tuple(layer.measure for layer in layers),
+                                      beam.element.order)
         laws = [layer.material.law(layer.shear) for layer in layers]
         if forces.small or not beam.has_sections:  # linearised laws; a cable has no others
             laws = [law if isinstance(law, LinearLaw) else LinearLaw(law.moduli(np.zeros(3)))
@@ -544,7 +535,12 @@ class Recovery:
 
     def modulus(self, strain: Array) -> Array:
         """dS_xx / deps_xx at constant S_yy and S_xy, at strains (3, n, m)."""
-        return self.by_law(_axial, strain)
+        def axial(law, strain):
+            C = law.compliance((0, 1, 2)) if isinstance(law, LinearLaw) else np.linalg.inv(
+                np.moveaxis(law.moduli(strain), (0, 1), (-2, -1)))
+            return 0.0 * strain[0] + 1.0 / C[..., 0, 0]
+
+        return self.by_law(axial, strain)
 
     def strain_of(self, stress: Array, strain: Array, unknown: tuple[int, ...] = (0, 1, 2)
                   ) -> Array:

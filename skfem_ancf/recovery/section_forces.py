@@ -6,7 +6,8 @@ a node and a section gives the section force and moment."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial, partialmethod
+from functools import lru_cache, partial
+from inspect import ismethod
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -17,7 +18,6 @@ from ..beam.beam import Beam
 from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
 from ..core import AncfError, Array, cached_property, gauss, lagrange
 from ..mesh.mapping import MappingBeam, cross
-from ..sections import Layer
 from ..sections.across import EDGE, off_ends, jumps, pieces
 
 #: Quadrature points along an element for its loads.
@@ -119,8 +119,8 @@ class Intervals:
     """Points ``eta`` (m,) across a section of layers, the highest one, with weights of integrals
     and values; ``layers`` are columns, ``width`` (m,) is relative."""
 
-    def __init__(self, layers: Sequence[Layer], order: int) -> None:
-        self._measures = [layer.measure for layer in layers]
+    def __init__(self, measures: Sequence[Any], order: int) -> None:
+        self._measures = measures
         pieces = [(piece, m.mean) for m in self._measures for piece in m.pieces]
         self._intervals = []
         for (low, high, b), _ in pieces:
@@ -200,6 +200,9 @@ class Intervals:
         low, high = (np.take_along_axis(x, which[None], 0)[0] for x in (low, high))
         starts, ends = self._low[which], self._high[which]
         return starts + (ends - starts) * (eta - low) / (high - low)
+
+
+intervals_of = lru_cache(32)(Intervals)
 
 
 class Sections:
@@ -505,35 +508,25 @@ class SectionForces:
 
 class Together:
     """Section forces of several instants with the same cuts: the axis of instants is that before n.
+    Arrays are as those of :class:`SectionForces`, with it behind the first axis if they have two.
     """
 
     def __init__(self, instants: Sequence[SectionForces]) -> None:
-        self.instants, first = instants, instants[0]
-        self.beam, self.small, self.lifted, self.cuts, self.viscous = (
-            first.beam, first.small, first.lifted, first.cuts, first.viscous)
+        self.instants = instants
         self.pressed = any(one.pressed for one in instants)
         self.sides = sorted({side for one in instants for side in one.sides})
 
-    def _forces(self, of: str, *where: Any) -> tuple[Array, Array]:
-        R, M = zip(*(getattr(one, of)(*where) for one in self.instants))
-        return np.stack(R, axis=1), np.array(M)
+    def __getattr__(self, name: str) -> Any:
+        first = getattr(self.instants[0], name)
 
-    def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
-        return self._forces("at", e, xi, begin)
+        def stacked(*where: Any) -> Any:
+            found = [getattr(one, name)(*where) for one in self.instants]
+            if isinstance(found[0], tuple):  # without Sections of a face
+                return tuple(None if isinstance(x[0], Sections) else np.stack(
+                    x, axis=min(1, x[0].ndim - 1)) for x in zip(*found))
+            return np.stack(found, axis=1)
 
-    def viscous_middles(self) -> tuple[Array, Array]:
-        return self._forces("viscous_middles")
-
-    def face(self, side: int, e: Array, xi: Array) -> tuple[None, Array]:
-        return None, np.stack([one.face(side, e, xi)[1] for one in self.instants], axis=1)
-
-    def _stacked(self, of: str, *where: Any) -> Array:
-        return np.stack([getattr(one, of)(*where) for one in self.instants], axis=1)
-
-    body = partialmethod(_stacked, "body")
-    sampled = partialmethod(_stacked, "sampled")
-    eigenstrain = partialmethod(_stacked, "eigenstrain")
-    tangent = partialmethod(_stacked, "tangent")
+        return stacked if ismethod(first) else first
 
 
 def _traction(beam, traction, X, e):

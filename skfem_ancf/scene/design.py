@@ -249,7 +249,7 @@ class Design:
             at += size
         out = -(adjoint_of(state, by_state, P) @ P)
         if functions:
-            z = changes_of(tangent_of(state, P), P, state.system.N)
+            z = changes_of(state, P)
             for function, at, size in functions:
                 out[at:at + size] = np.array([_along(function, state, x) for x in z.T]).T
         return out
@@ -404,7 +404,7 @@ class Gradient(Design):
         self._frozen, self._owners = [], np.zeros(0, int)
         P, N = self._changes(self._p, self.state), self.state.system.N
         adjoint_of(self.state, np.zeros((0, P.shape[0])), P)  # or why there is none
-        return self._shaped(changes_of(tangent_of(self.state, P), P, N)[:N])
+        return self._shaped(changes_of(self.state, P)[:N])
 
 
 def require_smooth(state: State) -> None:
@@ -475,9 +475,10 @@ def tangent_of(state: State, P: Any) -> Bordered:
     return Bordered([found.K], found.J, system.constraints, prescribed)
 
 
-def changes_of(solver: Bordered, P: Any, N: int) -> Array:
-    """The changes of displacements and multipliers, (N + m, n)."""
-    return np.concatenate(solver.solve([1.0], -P[:N].toarray(), -P[N:].toarray()))
+def changes_of(state: State, P: Any) -> Array:
+    """The changes of displacements and multipliers by those of their equations, (N + m, n)."""
+    N = state.system.N
+    return np.concatenate(tangent_of(state, P).solve([1.0], -P[:N].toarray(), -P[N:].toarray()))
 
 
 def _along(function, state, z):

@@ -127,10 +127,13 @@ class LinearModel:
         if np.any(self.readings.multipliers):
             raise InputError("joints are eliminated from a state space, and an output is the force "
                              "of a joint: use frequency_response(), or the force of a stiff spring")
-        M, D, K, T = self._reduced() if modes is None else self._modal(modes)
-        n = len(M)
-        inertia = scipy.linalg.cho_factor(M)
-        U, (m, d, k) = self._quasi_static(T)
+        M, D, K, T = self._basis(modes)
+        n, inertia, U = len(M), scipy.linalg.cho_factor(M), np.zeros_like(self.B)
+        # static displacements of unit prescribed motions, and their forces
+        if np.any(self.G) or np.any(self.prescribed):
+            slow = SHIFT * self._system.scales.bending_eigenvalue
+            U = self._dynamic.solve((1.0, 0.0, slow), 0.0 * self.B, self.G)[0]
+        m, d, k = (T.T @ (A @ U) for A in (self._mass(), *self.matrices[1:3]))
         # q + M^-1 m s and its rate less M^-1 d s are the state, which the rates of s leave out
         shift = scipy.linalg.cho_solve(inertia, m)
         rate = scipy.linalg.cho_solve(inertia, D @ shift - d)
@@ -145,46 +148,32 @@ class LinearModel:
                "frequency_response()")
         C = np.hstack([u @ T, v @ T]) + a @ T @ lower
         through = a @ T @ force + u @ moved + v @ T @ rate
-        if modes is not None:
-            through = through + u @ np.where(U.any(axis=0), 0.0, self._rest(T, K))
+        if modes is not None:  # static displacements of unit inputs without those of modes
+            slow = SHIFT * max(np.abs(np.diag(K)).max(), np.finfo(float).tiny)
+            rest = self._dynamic.solve((1.0, 0.0, slow), self.B, self.G)[0] - (
+                T @ np.linalg.solve(K + slow * np.eye(n), T.T @ self.B))
+            through = through + u @ np.where(U.any(axis=0), 0.0, rest)
         return StateSpace(A, np.vstack([rate, force]), C, through, T)
-
-    def _quasi_static(self, T):
-        """Static displacements of unit prescribed motions, (N, k), and the forces T^T A U of mass,
-        damping and stiffness."""
-        U = np.zeros_like(self.B)
-        if np.any(self.G) or np.any(self.prescribed):
-            shift = SHIFT * self._system.scales.bending_eigenvalue
-            U = self._dynamic.solve((1.0, 0.0, shift), 0.0 * self.B, self.G)[0]
-        return U, [T.T @ (A @ U) for A in (self._mass(), *self.matrices[1:3])]
 
     def _mass(self):
         refuse(self.matrices.M is None, "a material has no density: give density= of the material")
         return self.matrices.M
 
-    def _reduced(self):
-        """Mass, damping, stiffness and the basis (N, n) of all motions that joints allow."""
-        free, sizes = self._free, self._system.constraints.coordinate_sizes
-        T = np.diag(sizes)[:, free]
-        if self.matrices.J.shape[0]:
-            T = T @ scipy.linalg.null_space(self.matrices.J @ T)
-        return *(T.T @ (A @ T) for A in (self._mass(), *self.matrices[1:3])), T
-
-    def _modal(self, k):
-        """The same of the lowest modes."""
-        found = eigen.modes(self._system, self.state, require_integer("modes", k, 1))
+    def _basis(self, modes):
+        """Mass, damping, stiffness and the basis (N, n) of all motions that joints allow, or of the
+        lowest modes."""
+        _, D, K, _, _ = self.matrices
+        if modes is None:
+            T = np.diag(self._system.constraints.coordinate_sizes)[:, self._free]
+            if self.matrices.J.shape[0]:
+                T = T @ scipy.linalg.null_space(self.matrices.J @ T)
+            return *(T.T @ (A @ T) for A in (self._mass(), D, K)), T
+        found = eigen.modes(self._system, self.state, require_integer("modes", modes, 1))
         T = found.shapes.T
         refuse(np.iscomplexobj(T), "the loads have no potential, and modes are complex: use "
                "state_space() without modes")
-        K = np.diag(found.eigenvalues.real) if self._system.symmetric else (
-            T.T @ (self.matrices.K @ T))
-        return np.eye(k), T.T @ (self.matrices.D @ T), K, T
-
-    def _rest(self, T, K):
-        """Displacements (N, k) of unit inputs without those of modes, static."""
-        shift = SHIFT * max(np.abs(np.diag(K)).max(), np.finfo(float).tiny)
-        out = self._dynamic.solve((1.0, 0.0, shift), self.B, self.G)[0]
-        return out - T @ np.linalg.solve(K + shift * np.eye(len(K)), T.T @ self.B)
+        K = np.diag(found.eigenvalues.real) if self._system.symmetric else T.T @ (K @ T)
+        return np.eye(T.shape[1]), T.T @ (D @ T), K, T
 
     # frequencies
 
@@ -304,22 +293,16 @@ def _columns(system, state, loads, joint):
             s, (factor, acting) = system.of(load), load.acting(state.t)
             B[s] += factor * acting.force(np.array(state.u[s]))
         return [(B, np.zeros(system.constraints.m), none)]
-    t = state._time
-    return [(none, *system.constraints.driven(joint, change))
-            for change in _driven(joint, state, t)]
-
-
-def _driven(joint, state, t):
-    """Derivatives of the equations of a joint by what it prescribes, an array (m,) for each."""
-    function = getattr(joint, joint.driver)
+    # derivatives of the equations of the joint by what it prescribes
+    t, function = state._time, getattr(joint, joint.driver)
 
     def moved(by):
         other = joint._with(**{joint.driver: lambda time: np.asarray(function(time)) + by})
         return other.value(np.array(state.u), t)
 
-    n = np.size(function(t))
-    steps = TURN * np.eye(n) if np.ndim(function(t)) else [TURN]
-    return [(moved(by) - moved(-by)) / (2.0 * TURN) for by in steps]
+    steps = TURN * np.eye(np.size(function(t))) if np.ndim(function(t)) else [TURN]
+    return [(none, *system.constraints.driven(joint, (moved(by) - moved(-by)) / (2.0 * TURN)))
+            for by in steps]
 
 
 def rows_of(system: Any, state: State, sensor: Sensor) -> Readings:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import repeat
-from operator import attrgetter
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -451,14 +449,12 @@ class _Record:
         self.t = instant.t
 
     def history(self) -> StepHistory:
-        empty = np.zeros((0, self.system.N))
-        values: Iterable[Any] = zip(*map(
-            attrgetter(*COLUMNS), self._motions)) if self._motions else repeat(())
-        columns: dict[str, Any] = {
-            name: np.array([np.zeros(0) if x is None else x for x in xs])
-            for name, xs in zip(COLUMNS, values)}
+        columns: dict[str, Any] = {name: np.array([
+            np.zeros(0) if (x := getattr(y, name)) is None else x for y in self._motions])
+            for name in COLUMNS}
         if not self._motions:
-            columns |= dict.fromkeys(("u", "v", "acceleration"), empty)
+            empty = np.zeros((0, self.system.N))
+            columns |= {"u": empty, "v": empty, "acceleration": empty}
         iterations = [instant.result.iterations for instant in self._instants]
         return StepHistory(
             self.system, self.scheme, columns, (None, None), self._recorder.readings(),

@@ -10,7 +10,7 @@ import numpy as np
 from ..actions.forces.springs import Turns
 from ..actions.loads import Amplitude
 from ..core import Array, ArrayLike, ConvergenceError, InputError, refuse, require_finite
-from ..dynamics.base import Motion, Scheme
+from ..dynamics.base import Scheme
 from ..dynamics.history import state_of
 from ..dynamics.run import TimeStepFailed, integrator_of
 from ..dynamics.sensors import locate, read, read_steps
@@ -173,14 +173,11 @@ class Stepper:
         self._set(values)
         y = self._y if self._n else self._start()
         taken = self._integrator.run(y, self.dt, 1, self._begun, self._n)
-        self._y = taken[0] if taken else self._halved(y)
-        self._n, self._values = self._n + 1, values
-        self._y.turns = self._turns.follow(y.turns, self._y.u[None])[0]
-        return self
-
-    def _halved(self, y: Motion) -> Motion:
         try:
-            return self._integrator.step(y, self.dt)
+            self._y = taken[0] if taken else self._integrator.step(y, self.dt)  # in halves
         except TimeStepFailed as failure:
             raise ConvergenceError(f"the step from t = {y.t:.6g} failed: {failure}; try a smaller "
                                    "dt", self.state) from None
+        self._n, self._values = self._n + 1, values
+        self._y.turns = self._turns.follow(y.turns, self._y.u[None])[0]
+        return self
