@@ -5,6 +5,8 @@ They need nothing but ``start`` and ``evaluate``; all solvers keep their history
 
 import copy
 import pickle
+import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,8 +14,9 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, Item, MeshBeam,
-                        RigidBody, Scene, StVenantKirchhoff, sweep)
+from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamCable, InputError,
+                        Item, Line, MeshBeam, PointForce, Prony, RigidBody, Scene,
+                        StVenantKirchhoff, sweep)
 from skfem_ancf.actions.forces import ForceElement, point
 
 MATERIAL = StVenantKirchhoff(2e7, 0.3, 1000.0)
@@ -353,3 +356,109 @@ class Odd(Maxwell):
 def test_what_is_wrong_with_an_item_is_said(what, words):
     with pytest.raises(InputError, match=words):
         bare().add(Odd(what))
+
+
+# what a state takes along into another scene
+
+
+@pytest.mark.parametrize("more", ["obstacle", "spring"])
+def test_a_wound_spring_keeps_its_turns_beside_something_new(more):
+    beam = Beam(MeshBeam.init_line([0.0, 0.5, 1.0], 0.01), ElementBeamCable(3), MATERIAL, 0.01)
+
+    def wound(angle):
+        scene = Scene(beam).pin("left").torsional_spring(2.0, at="left")
+        scene.joint("angle", at="left", angle=angle)
+        return scene
+
+    state = wound(lambda t: 4.0 * np.pi * t).run(1.0, increments=20).state(-1)
+    scene = wound(lambda t: 4.0 * np.pi)
+    if more == "obstacle":
+        scene.obstacle(Circle((0.0, -5.0), 1.0))
+    else:
+        scene.torsional_spring(0.0, at="right")
+    for end in scene.run(2.0, increments=1, start=state), scene.integrate(
+            1.01, 0.005, start=state):
+        assert_allclose(abs(end.state(-1).multipliers[-1]), 2.0 * 4.0 * np.pi, rtol=1e-9)
+
+
+def test_friction_goes_on_where_another_obstacle_comes_or_goes():
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 5), 0.02), ElementBeamCable(3),
+                StVenantKirchhoff(2e9, 0.0, 1000.0), 0.01)
+
+    def scene(more):
+        made = Scene(beam).obstacle(Line((0.0, -0.01), (0.0, 1.0)), friction=0.5)
+        if more:
+            made.obstacle(Circle((5.0, 5.0), 0.1), friction=0.2)
+        made.point_force((20.0, 0.0), at="right", amplitude=lambda t: min(t, 1.0))
+        return made.line_load((0.0, -100.0))
+
+    for more in (True, False):
+        first = scene(more).run(1.0, increments=4)
+        held = first.displacement("left")[-1]
+        assert 1e-8 < held[0] < 1e-7  # friction holds by its springs
+        last = scene(not more).run(2.0, increments=2, start=first.state(-1))
+        assert_allclose(last.displacement("left")[-1], held, rtol=1e-6)
+
+
+def test_friction_begins_where_a_new_obstacle_is_added():
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 5), 0.02), ElementBeamCable(3),
+                StVenantKirchhoff(2e9, 0.0, 1000.0), 0.01)
+
+    def scene(*frictions):
+        made = Scene(beam).line_load((0.0, -100.0)).point_force(
+            (1.0, 0.0), at="right", amplitude=lambda t: max(t - 1.0, 0.0))
+        for y, friction in zip((5.0, -0.01), frictions):
+            made.obstacle(Line((0.0, y), (0.0, -np.sign(y))), friction=friction)
+        return made
+
+    state = scene(0.0, 0.0).fix("left", "r^1").run(1.0, increments=1).state(-1)
+    last = scene(0.0, 0.5).run(2.0, increments=2, start=state)
+    slid = last.displacement("left")[-1, 0] - state.displacement("left")[0]
+    assert 0.0 < slid < 1e-8  # it sticks where it is
+
+
+@pytest.mark.parametrize("name", ITEMS)
+def test_an_item_made_anew_has_the_history_of_its_place(name):
+    first = loaded(name)
+    state = first.run(1.0, increments=12).state(-1)
+    anew = Scene(*first.beams).clamp("left").add(ITEMS[name]())
+    anew.point_force((0.2, 1.0 if name == "item" else -1.0), at=TIP, amplitude=down_and_up)
+    whole, last = (one.run(2.0, increments=12, start=state) for one in (first, anew))
+    assert_allclose(last.u[-1], whole.u[-1], rtol=0, atol=1e-7)
+    assert_allclose(last.state(0).memory, state.memory, rtol=1e-9)
+
+
+def test_a_history_that_a_beam_cannot_take_over_is_said():
+    steel = ElasticPlastic(2e11, 0.3, 2.5e8, 2e9, density=7850.0)
+    strip = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 5), 0.02), ElementBeamCable(3), steel,
+                 0.01)
+    bent = Scene(strip).clamp("left").point_force(
+        (0.0, -200.0), at="right", amplitude=lambda t: t).run(1.0, increments=3).state(-1)
+    assert bent.field("plastic_strain", (0.0, 0.01)) > 1e-4
+    for other in (steel.replace(points=20), StVenantKirchhoff(2e11, 0.3, 7850.0)):
+        free = Scene(strip.replace(material=other)).clamp("left")
+        for solve in (free.solve_static, partial(free.run, 2.0),
+                      partial(free.integrate, 1.1, 0.1)):
+            with pytest.raises(InputError, match="cannot take over the history.*points="):
+                solve(start=bent)
+        flat = free.solve_static(start=free.state(bent.u))
+        assert np.max(np.abs(flat.u)) < 1e-9
+    same, harder = (Scene(strip.replace(material=steel.replace(yield_stress=y))).clamp(
+        "left").solve_static(start=bent).displacement("right")[1] for y in (2.5e8, 3e8))
+    assert -1e-3 < same < -1e-4
+    assert_allclose(harder, same, rtol=1e-6)
+
+
+def test_linear_models_say_what_relaxes():
+    elastic = StVenantKirchhoff(2e9, 0.3, 1000.0)
+    made = {"Prony": Prony(elastic, [0.5], [0.01]), "Maxwell": elastic, "": ElasticPlastic(
+        2e9, 0.3, 1e6, density=1000.0)}
+    for words, material in made.items():
+        scene = Scene(Beam(MeshBeam.init_line([0.0, 1.0], 0.02), ElementBeamCable(3), material,
+                           0.01)).clamp("left").sensor("tip", "displacement", at=TIP)
+        if words == "Maxwell":
+            scene.add(Maxwell(2e3, 1.0)).add(Ratchet(10.0))
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            scene.frequency_response([1.0], [PointForce((0.0, 1.0), at=TIP)])
+        assert [words in str(one.message) for one in found] == [True] * bool(words)

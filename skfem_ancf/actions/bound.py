@@ -385,6 +385,10 @@ class Remembering:
         self._values[:] = self.element.sample(positions(self, u), w, t,
                                               self.start if first else self.history)
 
+    def take_over(self, other: Remembering) -> None:
+        """Set the history to that of the same element in other equations."""
+        self._values[:] = other.history
+
     def relax(self, u: Array) -> None:
         """Set a history with less stiffness, of contact between members at u (N,)."""
         if hasattr(self.element, "relaxed"):
@@ -403,6 +407,13 @@ def positions(element: Any, u: Array) -> Array:
     if not element.changing:
         return np.array([link(u) for link in element.links])
     return u[element.all_dofs].reshape(-1, 2)
+
+
+def is_like(one: Remembering, other: Remembering) -> bool:
+    """True for elements of one class on the same places, with histories of one size."""
+    a, b = (getattr(x.element, "item", x.element) for x in (one, other))
+    return type(a) is type(b) and one.start.shape == other.start.shape and np.array_equal(
+        one.all_dofs, other.all_dofs)
 
 
 def recalled(element: Any) -> Any:

@@ -14,7 +14,11 @@ from ..actions.forces.system import Forces
 from ..beam.beam import Beam
 from ..beam.kernels.histories import ElementsWithHistory, Past, history_size
 from ..beam.remembered import remembers, with_history
-from ..core import Array
+from ..core import Array, InputError
+from ..materials.history import HistoryMaterial
+
+#: A displacement or strain, and a time, at which what relaxes shows it.
+SMALL, LONG = 1e-6, 1e12
 
 
 class Histories:
@@ -128,6 +132,20 @@ class Histories:
                     lost += e.accept(u0[s], u[s])
         return self.get(), lost
 
+    def relaxing(self) -> list[Any]:
+        """Materials and items whose force changes while nothing moves."""
+        out: list[Any] = []
+        for material in {layer.material for beam, _ in self._beams for layer in beam.across.layers}:
+            if isinstance(material, HistoryMaterial):
+                rest = SMALL * np.ones((3, 1)), np.zeros((material.number, 1))
+                out += [material] * _differ(*(material.stress(*rest, dt)[0] for dt in (0.0, LONG)))
+        for item in self.forces.remembering:
+            if not item.changing:
+                x = np.array([link.start for link in item.links])
+                out += [item] * _differ(*(item.evaluate(x + SMALL, 0.0 * x, 0.0, dt)[0]
+                                          for dt in (0.0, LONG)))
+        return out
+
     def relaxed(self, u: Array) -> Array | None:
         """The history with contact between members no stiffer than it needs to be at u."""
         for item in self.forces.remembering:
@@ -135,38 +153,38 @@ class Histories:
         return self.get()
 
     def of_state(self, state: Any) -> Array | None:
-        """The history of a State, as far as obstacles and beams are those of its scene, or None."""
+        """The history of a State, or None: that of obstacles, springs and items that its scene has
+        as well, and of beams, whose materials must be of the same kinds."""
         if state is None or state.memory is None:
             return None
         theirs = state.system.histories
         if theirs._parts is self._parts:
             return state.memory
-        out, known = self.rest.copy(), False
-        a, b = self.forces.contacts.tables, theirs.forces.contacts.tables
-        n = self.of_forces.size
-        if n == theirs.of_forces.size and np.array_equal(a.ints, b.ints) and np.array_equal(
-                a.floats, b.floats):
-            out[:n], known = state.memory[:n], n > 0
-        for part, other in self._shared(theirs):
-            if part.stop - part.start == other.stop - other.start:
-                out[part], known = state.memory[other], True
-        return out if known else None
+        now, then = self.after(None), theirs.after(state.memory)
+        known = bool(self.values.size) and now.forces.take_over(then.forces, state.u,
+                                                                state.t or 0.0)
+        for beam, other in zip(self._all, theirs._all):
+            old, new = (of._parts.get(id(b), slice(0)) for of, b in ((theirs, other), (self, beam)))
+            given = state.memory[old]
+            if len(given) == new.stop - (new.start or 0) and _laws(beam) == _laws(other):
+                now.values[new], known = given, known or len(given) > 0
+            elif np.any(given):
+                raise InputError(
+                    f"{beam!r} cannot take over the history of the state, which is that of "
+                    f"{_names(other)}: without it, what is bent would spring back. Keep the kinds "
+                    "of materials, and their points=; or begin with its displacements alone, "
+                    "start=scene.state(state.u)")
+        return now.values if known else None
 
-    def _shared(self, theirs):
-        """Parts of the same items, and of the same beams: the objects, or those in the same place
-        with such materials."""
-        for key in (item.element._key for item in self.forces.remembering):
-            if key in theirs._parts:
-                yield self._parts[key], theirs._parts[key]
-        for k, beam in enumerate(self._all):
-            other = beam if id(beam) in theirs._parts else (
-                theirs._all[k] if k < len(theirs._all) else None)
-            if id(beam) not in self._parts or id(other) not in theirs._parts:
-                continue
-            if _laws(beam) == _laws(other):
-                yield self._parts[id(beam)], theirs._parts[id(other)]
+
+def _differ(a, b):
+    return not np.allclose(a, b, rtol=1e-6, atol=1e-6 * np.max(np.abs(a)))
 
 
 def _laws(beam):
     """Kinds of the materials of a beam."""
     return [type(layer.material) for layer in beam.across.layers]
+
+
+def _names(beam):
+    return ", ".join(str(layer.material) for layer in beam.across.layers)

@@ -13,8 +13,8 @@ from scipy.sparse.linalg import splu
 
 from ..actions.loads import Load
 from ..beam.points import BeamPoints
-from ..core import (Array, ArrayLike, InputError, SupportError, refuse, require_finite,
-                    require_integer)
+from ..core import (Array, ArrayLike, InputError, ModelWarning, SupportError, refuse,
+                    require_finite, require_integer, warn)
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
 from ..results.response import FrequencyResponse
@@ -94,6 +94,10 @@ class LinearModel:
         refuse(np.any(state.v), "a linear model is about a state at rest, and this one moves: use "
                "the equilibrium, of a steady rotation that in a rotating frame, see "
                "skfem_ancf.RotatingFrame")
+        if relaxing := system.histories.relaxing():
+            warn(f"a linear model has the stiffness at once of {relaxing[0]!r}, which relaxes in "
+                 "time: it is right where all is fast beside that. A motion has all of it, by "
+                 "integrate(...) with a load of the frequency in question", ModelWarning)
         columns = [(name, _columns(system, state, *item)) for name, *item in inputs]
         self.inputs = [label for name, c in columns for label in _labels(name, len(c))]
         self.B, self.G, self.prescribed = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from functools import cached_property
@@ -21,9 +21,9 @@ from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of
 from .laws import mean_pressure, pressure_slope
 from .poses import carried, taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
-                     POSE, POSES, PRESSURES, RADIUS, RATE, SETTLE, STIFFNESS, TANGENT, TOLERANCE,
-                     TURNS, ContactTables, Pair, Question, SEEN as SEEN_AT, clear_table, pair_of,
-                     set_clear, transition, weights_of_motion)
+                     NUMBERS, POSE, POSES, PRESSURES, RADIUS, RATE, SETTLE, STIFFNESS, TANGENT,
+                     TOLERANCE, TURNS, ContactTables, Pair, Question, SEEN as SEEN_AT, clear_table,
+                     pair_of, set_clear, transition, weights_of_motion)
 
 
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
@@ -87,7 +87,7 @@ class Contacts:
     ``moving``, ``custom`` (a user-defined shape), ``anchored`` (friction), ``augmented``; ``keeps``
     if there are history data, with the angles of torsional springs, ``springs`` (k, n)."""
 
-    def __init__(self, elements: Sequence[Any], N: int, springs: Sequence[Array] = ()) -> None:
+    def __init__(self, elements: Sequence[Any], N: int, springs: int = 0) -> None:
         self.obstacles = [element for element in elements if element.groups]
         groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
         self.origin = np.zeros(2)
@@ -102,10 +102,9 @@ class Contacts:
         self.augmented = any(one.method == "augmented" for one in self.obstacles)
         tables = self._tables(N) if groups else NO_CONTACTS
         if springs:
-            tables = tables._replace(
-                floats=np.concatenate([tables.floats, *springs]),
-                memory=np.zeros(tables.memory.size + len(springs)), lasting=tables.lasting | TURNS)
-        self.tables, self._springs, self.keeps = tables, len(springs), bool(groups or springs)
+            tables = tables._replace(memory=np.zeros(tables.memory.size + springs),
+                                     lasting=tables.lasting | TURNS)
+        self.tables, self._springs, self.keeps = tables, springs, bool(groups or springs)
         self._answers: Any = None
         self.put(0.0, 0.0, self.tables.poses)
         if self.tables.clear.size:
@@ -497,3 +496,38 @@ def _inside(group, x, places, depth):
         if np.any(odd & (far.min(axis=1) > depth)):
             return k
     return None
+
+
+def matched(ours: Iterable[Any], theirs: Iterable[Any],
+            *same: Callable[[Any, Any], bool]) -> Iterator[tuple[Any, Any]]:
+    """Pairs of the same things in two lists, each once, by the first rule that finds one."""
+    rest, left = list(ours), list(theirs)
+    for rule in same:
+        for one in tuple(rest):
+            k = next((k for k, other in enumerate(left) if rule(one, other)), None)
+            if k is not None:
+                rest.remove(one)
+                yield one, left.pop(k)
+
+
+def take_over(ours: Contacts, theirs: Contacts, u: Array, t: float) -> bool:
+    """Give contacts the history of others for the same surfaces and obstacles, if there are some;
+    elsewhere friction begins at u and t."""
+    def known(contacts, k):
+        (which, _), pair = contacts.groups[k], contacts.pair(k)
+        shape = contacts.obstacles[which].shape
+        return (pair.first, pair.weights, pair.numbers[:NUMBERS], np.array(shape.kind),
+                shape.numbers_about(np.zeros(2)))
+
+    found = [*matched(range(len(ours.groups)), range(len(theirs.groups)), lambda k, j: all(
+        map(np.array_equal, known(ours, k), known(theirs, j))))]
+    if found:
+        new, old = ours.tables.memory, theirs.tables.memory
+        ours.begin(u, t, len(found) < len(ours.groups))
+        new[:LARGEST] = old[:LARGEST]
+        new[ANCHORED] = ours.anchored
+    for k, j in found:
+        new[LARGEST + k], ours.firmness[k] = old[LARGEST + j], theirs.firmness[j]
+        ours.pair(k).memory[:] = theirs.pair(j).memory
+        ours.pair(k).memory[1:3] += (theirs.origin - ours.origin)[:, None]
+    return bool(found)

@@ -337,10 +337,9 @@ class TorsionalSpring(ElasticElement):
 
     @property
     def key(self) -> Array:
-        """Numbers that differ for springs on other sections or with other free angles, (n,)."""
-        links = [np.concatenate([np.ravel(one.dofs), np.ravel(one.weights)])
-                 for one in (self._d, self._e)]
-        return np.concatenate([*links, self.numbers])
+        """Numbers that differ for springs on other sections, (n,)."""
+        return np.concatenate([np.ravel(x) for one in (self._d, self._e)
+                               for x in (one.start, one.dofs, one.weights)])
 
     @property
     def numbers(self) -> tuple[float, ...]:

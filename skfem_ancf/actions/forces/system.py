@@ -12,10 +12,10 @@ from scipy import sparse
 from ...beam.domain import Domain
 from ...core import Array
 from ...core.words import constant
-from ..contact.contacts import NO_CONTACTS, Contacts
+from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
 from ..places import Vector
-from ..bound import BoundForce, Remembering, UserForce, positions, recalled
+from ..bound import BoundForce, Remembering, UserForce, is_like, positions, recalled
 from .base import KernelElement
 from .inertia import RotatingFrame
 from .kernels import (ACCEPTING, ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHED_BACK, PUSHING,
@@ -154,7 +154,7 @@ class Forces:
         # those of user-defined laws first, then in the order of the parts
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
                                key=lambda e: -1 if e in self.custom else self.rows_of(e)[0])
-        self.contacts = Contacts(self.elements, N, [e.key for e in self._springs])
+        self.contacts = Contacts(self.elements, N, len(self._springs))
         damping = ({0: c, 1: b, 2: b, 3: a or b}[part.kind] for part in self.parts
                    for a, b, c in [part.numbers[:3]])
         self.resists = (any(e.resists for e in (*self.custom, *(e for e, _ in self.changing)))
@@ -324,6 +324,19 @@ class Forces:
         """The elements with a memory, without changing ones that do nothing at displacements."""
         idle = all(is_clear(self.clear, u, 0.0) for u in displacements)
         return [item for item in self.remembering if not (idle and item.changing)]
+
+    def take_over(self, other: Forces, u: Array, t: float) -> bool:
+        """Set the history to that of another scene with the same beams, at u and t, as far as it
+        has the same obstacles, springs and items; True if it has some."""
+        items = [*matched(self.remembering, other.remembering, lambda a, b: a.same(b), is_like)]
+        for item, one in items:
+            item.take_over(one)
+        turns, springs = self.contacts.turns, [*matched(
+            enumerate(self._springs), enumerate(other._springs),
+            lambda a, b: np.array_equal(a[1].key, b[1].key))]
+        for (k, spring), (j, one) in springs:
+            turns[k] = other.contacts.turns[j] + one._start - spring._start
+        return take_over(self.contacts, other.contacts, u, t) or bool(items or springs)
 
     def follow(self, u: Array) -> None:
         """Keep the angles of torsional springs at u."""
