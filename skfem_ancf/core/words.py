@@ -50,15 +50,14 @@ def hints(kind: Any) -> tuple[Any, ...]:
 
 def _collect(x, found):
     for value, hint in zip(x, hints(type(x))):
-        if hint is float:
-            found += _INTEGER.unpack(_FLOAT.pack(value))
-        elif isinstance(value, np.ndarray):
+        if isinstance(value, np.ndarray):
             flags = value.flags
             if value.dtype not in _DTYPES or not flags.c_contiguous:
                 raise TypeError(f"{type(x).__name__} takes contiguous arrays of floats or integers")
             # the first is several times as fast
-            found += (0 if not value.size else addressof(_NOTHING.from_buffer(value))
-                      if flags.writeable else value.ctypes.data), *value.shape
+            found.append(0 if not value.size else addressof(_NOTHING.from_buffer(value))
+                         if flags.writeable else value.ctypes.data)
+            found.extend(value.shape)
         elif isinstance(value, tuple):
             known = _CONSTANT.get(id(value))
             if known is None:
@@ -67,5 +66,7 @@ def _collect(x, found):
                 found += known.words
         elif isinstance(value, Words):
             found += value.words
+        elif hint is float:
+            found += _INTEGER.unpack(_FLOAT.pack(value))
         else:
             found.append(int(value))

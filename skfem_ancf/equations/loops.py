@@ -84,7 +84,7 @@ def flat_after(flat: tuple[Equations, Words, list[Words]], plain: Equations
 def _flat_body(body, words):
     found = [Words(_compiled(t)) for t in body.packs]
     words += found
-    return FlatBody(np.array([x.address for x in found], dtype=np.int64), body.table)
+    return Words(FlatBody(np.array([x.address for x in found], dtype=np.int64), body.table))
 
 
 def _compiled(t):

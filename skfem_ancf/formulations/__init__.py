@@ -61,17 +61,6 @@ class Term:
         """Points across the section where the strain is evaluated."""
         return np.asarray(self.section_samples[0] if self.section_samples else self.section[0])
 
-    def matrix(self, component: str) -> Array | None:
-        """Interpolation matrix from samples to integration points; None for the identity."""
-        sampled = component in self.samples
-        if not sampled and self.section_samples is None:
-            return None
-        xi = self.axis[0]
-        along = lagrange(self.samples[component], xi) if sampled else np.eye(len(xi))
-        across = self.section_samples[1] if self.section_samples else np.eye(len(self.section[0]))
-        both = along[:, None, :, None] * across[:, None]
-        return both.reshape(len(along) * len(across), -1)
-
 
 def refuse_rigid_sections(element: ElementBeam, material: Material, law: Law) -> None:
     """Raise InputError for sections of order 1 of a material with a history."""
@@ -347,20 +336,21 @@ class Assumed(Formulation):
             z[0] = mesh.p[0] + 1j * mesh.p[1]
             z = z[:, mesh.t].swapaxes(0, 1).reshape(2 * n, -1).T
             chord = z[:, n] - z[:, 0]
-        K = np.zeros((len(L), 2 * n, 2 * n), float if straight else complex)
-        for mode in element.stabilised:
-            c = mode.weights * along
-            of = L if mode.per == "element" else mesh.chain_lengths[:len(L)] if mode.per else 1.0
-            k = self.alpha * mode.size * EI / of**2 * L
-            if not straight:
-                turned = np.sum(c * z, axis=1) / chord
-                c = c + 0j
-                c[:, 0] += turned
-                c[:, n] -= turned
-            K += (k[:, None] * c.conj())[:, :, None] * c[:, None]
-        out = np.empty((len(L), 2 * n, 2, 2 * n, 2))
+        weights, sizes, per = zip(*element.stabilised)
+        lengths = {"element": L, "beam": mesh.chain_lengths[:len(L)], "": 1.0 + 0.0 * L}
+        k = self.alpha * EI * np.array(sizes)[:, None] * np.array([
+            L / lengths[name]**2 for name in per])
+        c = np.array(weights)[:, None] * along  # of each mode and element
+        if not straight:
+            turned = np.sum(c * z, axis=2) / chord
+            c = c + 0j
+            c[..., 0] += turned
+            c[..., n] -= turned
+        K = (k[..., None] * c.conj()).transpose(1, 2, 0) @ c.swapaxes(0, 1)
+        out = np.zeros((len(L), 2 * n, 2, 2 * n, 2))
         out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = K.real
-        out[:, :, 1, :, 0], out[:, :, 0, :, 1] = K.imag, -K.imag
+        if not straight:
+            out[:, :, 1, :, 0], out[:, :, 0, :, 1] = K.imag, -K.imag
         return out.reshape(len(L), 4 * n, 4 * n)
 
 

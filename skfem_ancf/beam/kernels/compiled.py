@@ -122,7 +122,9 @@ def _blocks(x):
 
 @lru_cache(64)
 def _lower(m, k):
-    return np.tril_indices(m, k)
+    """Rows and columns of a lower half (m, m), and its positions and those of its transpose."""
+    i, j = np.tril_indices(m, k)
+    return i, j, m * i + j, m * j + i
 
 
 def _scales(x):
@@ -136,9 +138,9 @@ def _products(G, products, own):
         return np.zeros((0, 0)), np.zeros((0, 0))
     m, (g, h) = G.shape[1], products
     both = (G.take(g, 0).T[:, None] * G.take(h, 0).T).reshape(m * m, -1)
-    (P, other), (Q, opposite) = ((both.take(m * i + j, 0), both.take(m * j + i, 0))
-                                 for i, j in (_lower(m, 0), _lower(m, -1)))
-    return P + other, (Q - opposite).compress(g != h, 1)
+    (*_, one, other), (*_, two, opposite) = _lower(m, 0), _lower(m, -1)
+    return (both.take(one, 0) + both.take(other, 0),
+            (both.take(two, 0) - both.take(opposite, 0)).compress(g != h, 1))
 
 
 def _symmetric_and_skew(C, D):
@@ -147,7 +149,7 @@ def _symmetric_and_skew(C, D):
         return _NOTHING, _NOTHING
     m = D.shape[1]
     C = C.reshape(len(C), m, 2, m, 2) / (D[:, :, None, None, None] * D[:, None, None, :, None])
-    (i, j), (a, b) = _lower(m, 0), _lower(m, -1)
+    (i, j, *_), (a, b, *_) = _lower(m, 0), _lower(m, -1)
     one, two = C[:, :, 0, :, 1], C[:, :, 1, :, 0]
     K = np.stack([C[:, i, 0, j, 0], C[:, i, 1, j, 1], 0.5 * (one + two)[:, i, j]], axis=2)
     return _blocks(K), _blocks(0.5 * (one - two)[:, a, b])
@@ -157,7 +159,7 @@ def _coupled(K, Z, m):
     """Functions k >= l that K and Z couple, and 1 if component x of one acts on y of the other."""
     if not len(K):
         return np.zeros((3, 0), np.int64)
-    k, l = _lower(m, 0)
+    k, l, *_ = _lower(m, 0)
     both = K.any(axis=0).reshape(len(k), 3, W).any(axis=2)
     both[k != l, 2] |= Z.any(axis=(0, 2))
     used = both.any(axis=1)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, product_rule
+from ...core import Array, lagrange, product_rule
 from ...elements.base import ElementBeam
 from ...formulations import Formulation, Term
 from ...mesh.mesh_beam import MeshBeam
@@ -55,8 +55,9 @@ class SectionKernel(ElementKernel):
         """Add the tables of a term; returns its samples and the volumes of its points."""
         across, ne, nb = self._across, self.t.shape[1], self.nd
         tind = np.array([0]) if across.uniform else None
-        samples = samples_of(*(tuple(np.asarray(x, dtype=float).tolist()) for x in (
-            *map(term.nodes, ("xx", "yy", "xy")), term.section_nodes)))
+        *nodes, eta, axis = (tuple(np.asarray(x, dtype=float).tolist()) for x in (
+            *map(term.nodes, ("xx", "yy", "xy")), term.section_nodes, term.axis[0]))
+        samples = samples_of(*nodes, eta)
         if samples not in rows:
             rows[samples] = _rows(across.mesh, across.element, samples, tind)
         G, frame = rows[samples]
@@ -64,17 +65,24 @@ class SectionKernel(ElementKernel):
         volumes = across.volume(layer, *X, tind, whole)
         weights = volumes if layer.grade is None else across.volume(layer, *X, tind, whole, "grade")
         law = law_tables(term.law, self)
-        pairs, H = _moduli(samples, term, law, weights)
+        linear, means = law.kind == LINEAR, len(eta) if term.section_samples is None else tuple(
+            map(tuple, np.asarray(term.section_samples[1]).tolist()))
+        A, pairs, products, sizes = _mixing(samples, tuple(nodes), axis, means, (
+            law.D != 0.0).tobytes() if linear else b"\1" * 9)
+        H, along = weights @ products, np.zeros((0, A.shape[1]))
+        if linear:
+            keep = (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ sizes)).any(axis=0)
+            keep |= pairs[0] == pairs[1]
+            pairs, H = pairs.compress(keep, 1), H.compress(keep, 1)
+        else:
+            along = np.concatenate([np.where(samples.component == k, A, 0.0) for k in range(3)])
+        H *= law.D[tuple(samples.component[pairs])]
         C = np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if constant is None else constant[:, 2:, 2:]
-        along = np.zeros((0, len(samples.component)))
-        if law.kind != LINEAR:
-            mixed, c = _interpolation(samples, term), samples.component
-            along = np.concatenate([np.where(c == k, mixed, 0.0) for k in range(3)])
         each = [len(x) > 1 for x in (G, frame, H, C, weights)]
         self.tables.append(StrainTables(
             pattern_of(SECTION, samples.rows, pairs), nb * self.t[0].astype(np.int64),
-            np.outer(np.arange(ne), each), *map(np.ascontiguousarray, (G, frame, H, C)), law,
-            *map(np.ascontiguousarray, (along, weights))))
+            np.arange(ne)[:, None] * each, *map(np.ascontiguousarray, (G, frame, H, C)), law,
+            along, np.ascontiguousarray(weights)))
         return samples, volumes
 
     @property
@@ -182,22 +190,20 @@ def _rows(mesh, element, samples, tind):
     return G[:, :, 1:], frame
 
 
-def _interpolation(samples, term):
-    """Matrix (points, ns) from the samples of each component to the integration points."""
-    n = len(term.quadrature[1])
-    matrices = [term.matrix(name) for name in ("xx", "yy", "xy")]
-    return np.concatenate([np.eye(n) if x is None else x for x in matrices], axis=1)
+@lru_cache(64)
+def _mixing(samples, nodes, axis, means, coupled):
+    """Matrix A (points, ns) from the samples to the integration points, pairs s <= t of samples
+    that the law couples (2, nq), and the products of their columns and the sizes of these.
 
-
-def _moduli(samples, term, law, weights):
-    """Pairs of coupled samples (2, nq), and their moduli (1 or ne, nq)."""
-    A, c = _interpolation(samples, term), samples.component
-    D = law.D[c[:, None], c] if law.kind == LINEAR else np.ones((len(c), len(c)))
-    row, size = np.arange(len(c)), np.abs(A)
-    s, t = (((size.T @ size > 0.0) & (D != 0.0) & (row[:, None] < row))
-            | (row[:, None] == row)).nonzero()
-    D, A = law.D[c[s], c[t]], (A[:, s] * A[:, t]).T
-    H = weights @ A.T
-    keep = (s == t) | (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ np.abs(A).T)).any(axis=0)
-    keep |= law.kind != LINEAR
-    return np.array([s[keep], t[keep]]), (H * D)[:, keep]
+    ``nodes`` and ``axis`` are axial coordinates of the samples of each component, and of the
+    integration points; ``means`` are the weights of the samples across, or their number if these
+    are the points. ``coupled`` are the bytes of a matrix (3, 3): which components are.
+    """
+    across = np.eye(means) if isinstance(means, int) else np.array(means)
+    A = np.concatenate([np.kron(np.eye(len(axis)) if at == axis else lagrange(at, axis), across)
+                        for at in nodes], axis=1)
+    c, size, row = samples.component, np.abs(A), np.arange(A.shape[1])
+    both = np.frombuffer(coupled, bool).reshape(3, 3)[c[:, None], c] & (size.T @ size > 0.0)
+    pairs = np.array((both & (row[:, None] < row) | (row[:, None] == row)).nonzero())
+    products = A[:, pairs[0]] * A[:, pairs[1]]
+    return A, pairs, products, np.abs(products)
