@@ -390,7 +390,7 @@ class Traction(Load):
             found = [divided(beam, one, at) for one in found]
         for one in found:
             density = at(one.X, one.elements) if callable(t) else t[:, None, None]
-            functions = beam.element.of_mesh(mapping, one.X, one.elements)[0]
+            functions = beam.element.values(mapping, one.X, one.elements)
             forces.append(density * one.areas)
             add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions, forces[-1]), vector)
         if not beam.has_sections:  # warn where the moment that it leaves out is large
@@ -746,7 +746,7 @@ def _along_axis(beam, chains, given, name):
     values = at(X, part.elements) if callable(given) else given[:, None, None]
     values = values * np.hypot(*mapping.DF(X, part.elements)[:, 0])
     vector = np.zeros(beam.N)
-    functions = beam.element.of_mesh(mapping, X, part.elements)[0]
+    functions = beam.element.values(mapping, X, part.elements)
     add_nodal(beam, part.elements, np.einsum("kep,iep->eik", values * size * w, functions), vector)
     return vector, Distribution(sampled=(Sampled(
         AXIS, part.elements, xi, values, parts=np.array([part.begin, part.end])),))

@@ -59,7 +59,7 @@ def probe_reference(beam: Any, e: int, X: Array) -> tuple[Array, Array]:
     """As :func:`probe`, for a point (2,) of the reference cell."""
     dofs = beam.mesh.t[0, e] * beam.nd + np.arange(2 * beam.nd).reshape(-1, 2).T
     X = np.reshape(X, (2, 1, 1))
-    return dofs, beam.element.of_mesh(beam.mesh.mapping(), X, np.array([e]))[0].ravel()
+    return dofs, beam.element.values(beam.mesh.mapping(), X, np.array([e])).ravel()
 
 
 def element_dofs(beam: Any, elements: Array | None = None) -> Array:
@@ -128,7 +128,7 @@ def displacements(beam: Any, u: Array, X: Array, tind: Array | None) -> Array:
     """As :meth:`Beam.displacements <skfem_ancf.Beam.displacements>`; u may be complex."""
     mapping = beam.mesh.mapping()
     u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-    out = np.einsum("eki,kep->iep", u_e, beam.element.of_mesh(mapping, X, tind)[0], optimize=True)
+    out = np.einsum("eki,kep->iep", u_e, beam.element.values(mapping, X, tind), optimize=True)
     if beam.has_sections:
         return out
     e, P, shape = _flat(beam, X, tind)

@@ -80,7 +80,7 @@ def masses_of(beam: Any) -> Masses:
             length = mesh.lengths[slice(None) if tind is None else tind, None]
             N = N * element.powers(mesh.height, length).T[:, :, None]
         else:
-            N = element.of_mesh(mesh.mapping(), X, tind)[0]
+            N = element.values(mesh.mapping(), X, tind)
         parts.append((N, across.volume(layer, X, W, tind, times="density", full=True)))
     return Masses(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
@@ -128,7 +128,7 @@ def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
     """L2 projection (N,) of a velocity field, a function of points (2, nelements, npoints)."""
     X, W = exact_rule(beam)
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
-    N = element.of_mesh(mapping, X)[0].transpose(1, 0, 2)
+    N = element.values(mapping, X).transpose(1, 0, 2)
     weighted, back = N * (mapping.full_volume(X) * W)[:, None], N.transpose(0, 2, 1)
     gram = BandMatrix.zeros(beam.N // 2, nd - 1)  # of one component
     gram.add_elements(weighted @ back, 0, nd // 2, mesh.t[0])

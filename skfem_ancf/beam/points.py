@@ -61,18 +61,14 @@ class BeamPoints:
         return first + np.arange(2 * self.beam.nd).reshape(-1, 2, 1)
 
     @cached_property
-    def _functions(self):
-        return self.beam.element.of_mesh(self.beam.mesh.mapping(), self.at, self.e)
-
-    @property
     def weights(self) -> Array:
         """Shape functions, (nb, n)."""
-        return self._functions[0][..., 0]
+        return self.beam.element.values(self.beam.mesh.mapping(), self.at, self.e)[..., 0]
 
-    @property
+    @cached_property
     def slopes(self) -> Array:
         """Derivatives of the shape functions by xi, (nb, n)."""
-        return self._functions[1][..., 0]
+        return self.beam.element.of_mesh(self.beam.mesh.mapping(), self.at, self.e)[1][..., 0]
 
     def combine(self, weights: Array, u: Array) -> Array:
         """The sum (..., 2, n) of weighted DOFs (..., N) at each point."""

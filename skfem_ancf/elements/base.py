@@ -306,7 +306,7 @@ class ElementBeam(Immutable, Element):
         power, slope = self._powers
         return h**power * L**slope
 
-    @property
+    @cached_property
     def by_reference(self) -> bool:
         """True if elements follow from one of unit length and height by :meth:`powers`."""
         kind, base = type(self), ElementBeam
@@ -334,6 +334,15 @@ class ElementBeam(Immutable, Element):
         lengths = mapping.mesh.lengths if tind is None else mapping.mesh.lengths[tind]
         scale = (lengths ** slope[:, None])[:, :, None]
         return [scale * (x[:, None] if x.ndim == 2 else x) for x in found]
+
+    def values(self, mapping: MappingBeam, X: Array, tind: Array | None = None) -> Array:
+        """The local functions of :meth:`of_mesh` alone."""
+        if self.section.number or not self.by_reference:
+            return self.of_mesh(mapping, X, tind)[0]
+        found = hermite_basis(self._along[0], X[0])
+        lengths = mapping.mesh.lengths if tind is None else mapping.mesh.lengths[tind]
+        return (lengths ** self._powers[1][:, None])[:, :, None] * (
+            found[:, None] if found.ndim == 2 else found)
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:

@@ -114,8 +114,8 @@ class Finder:
 
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
         """Elements (n,), reference points (2, n), relative distances outside of them (zero, or
-        infinite far away) for points (2, n) of a ``chain`` or of all, and whether chains are
-        equally near."""
+        infinite or not a number far away) for points (2, n) of a ``chain`` or of all, and whether
+        chains are equally near."""
         n = x.shape[1]
         noise = 1e-9 + 8 * EPS * (
             self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
@@ -131,7 +131,6 @@ class Finder:
                 X = np.array([xi, 0.5 + across / h])
                 outside = np.abs(X - 0.5).max(axis=0) - 0.5
                 outside[outside < noise] = 0.0
-                outside[~(outside <= 1.0)] = np.inf
                 return e, X.clip(0.0, 1.0), outside, np.zeros(n, dtype=bool)
             if chain is not None or not self.is_chain:
                 return self._best(x, noise, *self._pairs(x, chain))
@@ -189,8 +188,9 @@ class Finder:
     def inside(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array]:
         """As :meth:`find`, but raises MeshError for points outside the body, or the chain."""
         e, X, outside, tied = self.find(x, chain)
-        if (outside > self.allowed).any():
-            bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
+        inside = outside <= self.allowed
+        if not inside.all():
+            bad, mesh = np.flatnonzero(~inside), self.mesh
             x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
             raise MeshError(
                 f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "

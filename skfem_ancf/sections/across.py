@@ -220,12 +220,12 @@ class Across(Immutable):
         self.layers: tuple[Layer, ...] = tuple(
             s if (measure := s.measure.of_order(element.order)) is s.measure else
             replace(s, measure=measure) for s in section.layers_on(mesh, material))
-        varying, even = any(s.varies for s in self.layers), mesh.heights is None
+        varying, even = any([s.varies for s in self.layers]), mesh.heights is None
         self.plain = isinstance(section, Rectangle) and not varying
         self.simple = self.plain and even
         self.constant = even and not varying
         self.uniform = self.constant and mesh.is_uniform
-        self.moving = any(s.measure.moves for s in self.layers)
+        self.moving = any([s.measure.moves for s in self.layers])
         if varying:  # evaluate all functions over the body, so that errors appear here
             X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
             for layer in self.layers:
@@ -484,12 +484,13 @@ class Across(Immutable):
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
         if self.plain:
-            layer, h = self.layers[0], self.heights(xi, tind) + np.zeros((ne, n))
+            layer, h, out = self.layers[0], self.heights(xi, tind), np.zeros((3, ne, n))
             times = self.at(layer, xi).factor(TIMES[what]) if TIMES[what] else 1.0
-            size = h * (layer.width * times)
             if what in MODULI:
-                size = size * getattr(layer.material, MODULI[what])
-            return np.array([size, 0.0 * size, size * h * h / 12.0])
+                times = times * getattr(layer.material, MODULI[what])
+            out[0] = size = h * layer.width * times
+            out[2] = size * h * h / 12.0
+            return out
         mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
         for layer, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))

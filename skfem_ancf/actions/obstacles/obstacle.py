@@ -232,7 +232,7 @@ class Obstacle(ForceElement):
             slopes = np.moveaxis(G[0], -1, 0).reshape(-1, n * m)
             starts[2:] = np.moveaxis(frame[0], -1, 0)
         starts[:2] = mapping.F(at, elements)
-        weights = beam.element.of_mesh(mapping, at, elements)[0]
+        weights = beam.element.values(mapping, at, elements)
         if tind is None:  # lengths of both sides, by xi, and their widths
             half, length = m // 2, np.hypot(*mapping.DF(at, elements)[:, 0])
             width = [np.broadcast_to(face_width(beam.across, side, part, elements), (n, half))

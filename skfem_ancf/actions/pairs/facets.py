@@ -113,7 +113,7 @@ def _of_beam(beam):
         X = np.array([0.5 + 0.5 * nodes, np.full(n, at)])
         where = np.array([0.5 + 0.5 * rule[0], np.full(len(rule[0]), at)])
         width = face_width(beam.across, int(eta), where, np.arange(mesh.nelements))
-        yield _facets(dofs, element.of_mesh(mapping, X)[0].transpose(1, 0, 2),
+        yield _facets(dofs, element.values(mapping, X).transpose(1, 0, 2),
                       _complex(mapping.F(X)), nodes, rule, width, sides=side, chains=mesh.chains,
                       offsets=0.0 if beam.has_sections else 0.5 * mesh.height, places=s,
                       spans=mesh.lengths + np.zeros(mesh.nelements), **common)
@@ -121,7 +121,7 @@ def _of_beam(beam):
     nodes, rule = gauss_lobatto(n), _rule(ACROSS)
     for e, xi, side in ((begins, 0.0, 1.0), (ends, 1.0, -1.0)):
         X, where = (np.array([np.full(len(y), xi), 0.5 + 0.5 * y]) for y in (nodes, rule[0]))
-        weights = element.of_mesh(mapping, X, e)[0].transpose(1, 0, 2) + 0j
+        weights = element.values(mapping, X, e).transpose(1, 0, 2) + 0j
         if not beam.has_sections:
             slopes = beam_gradients(mesh, element, X, e)[0][0].transpose(0, 2, 1)
             weights += 0.5j * mesh.height * nodes * slopes
