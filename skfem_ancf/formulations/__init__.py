@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, Immutable, InputError, Law, Rule, cached_property, gauss, lagrange,
+from ..core import (Array, Immutable, InputError, Law, Rule, cached_property, gauss,
                     product_rule, read_only, refuse, require_finite_scalar, require_like,
                     require_option, stress_of)
 from ..elements.base import ElementBeam

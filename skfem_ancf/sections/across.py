@@ -220,12 +220,12 @@ class Across(Immutable):
         self.layers: tuple[Layer, ...] = tuple(
             s if (measure := s.measure.of_order(element.order)) is s.measure else
             replace(s, measure=measure) for s in section.layers_on(mesh, material))
-        varying, even = any([s.varies for s in self.layers]), mesh.heights is None
+        varying, even = any(s.varies for s in self.layers), mesh.heights is None
         self.plain = isinstance(section, Rectangle) and not varying
         self.simple = self.plain and even
         self.constant = even and not varying
         self.uniform = self.constant and mesh.is_uniform
-        self.moving = any([s.measure.moves for s in self.layers])
+        self.moving = any(s.measure.moves for s in self.layers)
         if varying:  # evaluate all functions over the body, so that errors appear here
             X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
             for layer in self.layers:
