@@ -30,7 +30,8 @@ class Domain(Immutable):
 
     The unknown is the displacement from the reference configuration, ``w["u"]`` in the forms, with
     the DOFs of the basis. The forms include the thickness. ``scene.weld((domain, "right"), (beam,
-    "left"))`` connects a boundary to a beam.
+    "left"))`` connects a boundary to a beam. Raises InputError if the basis has no plane vectors,
+    or if the tangent is not the derivative of the residual.
 
     Parameters
     ----------
@@ -45,11 +46,6 @@ class Domain(Immutable):
         ``BilinearForm`` of the mass, ``rho * dot(u, v)``, for weight, modes and motion.
     name
         Name in messages.
-
-    Raises
-    ------
-    InputError
-        If the basis has no plane vectors, or if the tangent is not the derivative of the residual.
 
     Notes
     -----
@@ -127,6 +123,8 @@ class Domain(Immutable):
               name: str | None = None) -> Domain:
         """A domain of a material of the package or a user-defined one, with stress in results.
 
+        Raises InputError if the material has a history.
+
         Parameters
         ----------
         basis
@@ -139,11 +137,6 @@ class Domain(Immutable):
             Thickness out of the plane, positive.
         name
             Name in messages.
-
-        Raises
-        ------
-        InputError
-            If the material has a history.
 
         Examples
         --------

@@ -24,7 +24,9 @@ class RigidBody(Immutable):
     are linear in the DOFs, the mass matrix is constant, and ``d . d = 1`` is a constraint with a
     multiplier.
 
-    A material point is named by its initial position (x, y) and may lie outside of the outline.
+    A material point is named by its initial position (x, y) and may lie outside of the outline. See
+    Garcia de Jalon, Bayo: "Kinematic and dynamic simulation of multibody systems", Springer (1994),
+    chapter 2: natural coordinates.
 
     Parameters
     ----------
@@ -47,11 +49,6 @@ class RigidBody(Immutable):
     ----------------
     u, v
         Displacement of the degrees of freedom and its rate, shape (4,) or (..., 4).
-
-    References
-    ----------
-    Garcia de Jalon, Bayo: "Kinematic and dynamic simulation of multibody systems", Springer (1994),
-    chapter 2: natural coordinates.
 
     Examples
     --------

@@ -68,12 +68,9 @@ class Collocation(Scheme):
     Materials and items with a history have that of the start of the step at all points, with the
     time since then: the order is that of their law.
 
-    A method is a subclass with :attr:`points` and ``order``.
-
-    References
-    ----------
-    Hairer, Lubich, Wanner: "Geometric Numerical Integration", II.1.4, and Hairer, Wanner: "Solving
-    Ordinary Differential Equations II", IV.8, eq. (8.8), for the transformation.
+    A method is a subclass with :attr:`points` and ``order``. See Hairer, Lubich, Wanner: "Geometric
+    Numerical Integration", II.1.4, and Hairer, Wanner: "Solving Ordinary Differential Equations
+    II", IV.8, eq. (8.8), for the transformation.
     """
 
     tol = 1e-12
@@ -147,7 +144,8 @@ class Gauss(Collocation):
     are dominated by vibrations that the steps do not resolve; use :class:`Radau` for those.
 
     Joints that are linear in the degrees of freedom and do not move (rigid connections, hinges of
-    beams) keep the order; other joints and rigid bodies raise an InputError.
+    beams) keep the order; other joints and rigid bodies raise an InputError. See Hairer, Lubich,
+    Wanner: "Geometric Numerical Integration", II.1.3 and VI.4.
 
     Parameters
     ----------
@@ -159,10 +157,6 @@ class Gauss(Collocation):
     >>> from skfem_ancf.dynamics import Gauss
     >>> Gauss(3), Gauss(3).order
     (<Gauss, 3 points>, 6)
-
-    References
-    ----------
-    Hairer, Lubich, Wanner: "Geometric Numerical Integration", II.1.3 and VI.4.
     """
 
     name = "gauss"
@@ -189,17 +183,14 @@ POINTS = read_only(np.array([0.4 - 0.1 * np.sqrt(6.0), 0.4 + 0.1 * np.sqrt(6.0),
 class Radau(Collocation):
     """Radau IIA with three points: order 5, L-stable.
 
-    Vibrations that a step does not resolve are damped at once: for stiff beams and large steps.
+    Vibrations that a step does not resolve are damped at once: for stiff beams and large steps. See
+    Hairer, Wanner: "Solving Ordinary Differential Equations II", IV.5, table 5.6.
 
     Examples
     --------
     >>> from skfem_ancf.dynamics import Radau
     >>> Radau().points.round(4).tolist()
     [0.1551, 0.6449, 1.0]
-
-    References
-    ----------
-    Hairer, Wanner: "Solving Ordinary Differential Equations II", IV.5, table 5.6.
     """
 
     name = "radau"

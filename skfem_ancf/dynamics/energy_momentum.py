@@ -58,19 +58,15 @@ class EnergyMomentum4(EnergyMomentum):
 
     A composition of five steps of :class:`EnergyMomentum` with 0.41, 0.41, -0.66, 0.41 and 0.41
     times the step size. It conserves what each step conserves. The step back in time excludes
-    damping and friction.
+    damping and friction. See Suzuki: "Fractal decomposition of exponential operators with
+    applications to many-body theories and Monte Carlo simulations", Physics Letters A 146 (1990);
+    Hairer, Lubich, Wanner: "Geometric Numerical Integration", II.4, example 4.3.
 
     Examples
     --------
     >>> from skfem_ancf.dynamics import get_scheme
     >>> get_scheme("energy-momentum-4").order
     4
-
-    References
-    ----------
-    Suzuki: "Fractal decomposition of exponential operators with applications to many-body theories
-    and Monte Carlo simulations", Physics Letters A 146 (1990); Hairer, Lubich, Wanner: "Geometric
-    Numerical Integration", II.4, example 4.3.
     """
 
     name = "energy-momentum-4"

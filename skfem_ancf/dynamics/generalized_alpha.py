@@ -67,15 +67,13 @@ class GeneralizedAlpha(Scheme):
 class HHT(GeneralizedAlpha):
     """The scheme of Hilber, Hughes and Taylor.
 
+    See Hilber, Hughes, Taylor: "Improved numerical dissipation for time integration algorithms in
+    structural dynamics", Earthquake Engineering and Structural Dynamics 5 (1977).
+
     Parameters
     ----------
     alpha
         From 0 (no damping) to 1/3; the authors' alpha is its negative.
-
-    References
-    ----------
-    Hilber, Hughes, Taylor: "Improved numerical dissipation for time integration algorithms in
-    structural dynamics", Earthquake Engineering and Structural Dynamics 5 (1977).
     """
 
     name = "hht"
@@ -89,15 +87,13 @@ class HHT(GeneralizedAlpha):
 class Newmark(GeneralizedAlpha):
     """Newmark's scheme; by default the trapezoidal rule, beta = 1/4, gamma = 1/2.
 
+    See Newmark: "A method of computation for structural dynamics", Journal of the Engineering
+    Mechanics Division ASCE 85 (1959).
+
     Parameters
     ----------
     beta, gamma
         Newmark's parameters; second order for gamma = 1/2 only.
-
-    References
-    ----------
-    Newmark: "A method of computation for structural dynamics", Journal of the Engineering
-    Mechanics Division ASCE 85 (1959).
     """
 
     name = "newmark"

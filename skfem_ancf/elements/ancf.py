@@ -37,7 +37,10 @@ class ElementBeamANCF(ElementBeam):
 
     The position is cubic along the axis and a polynomial of degree N across the section, whose
     derivative ``r_Y`` is interpolated at N points from bottom to top. Order 1 is the element of
-    Omar and Shabana, order 2 that of Zheng.
+    Omar and Shabana, order 2 that of Zheng. Raises InputError if the order is not an integer >= 1,
+    NameUnknown if the family of points is not known. See "A series of locking-free beam element
+    models in absolute nodal coordinate formulation", Archive of Applied Mechanics (2024), section
+    2.
 
     Parameters
     ----------
@@ -46,18 +49,6 @@ class ElementBeamANCF(ElementBeam):
     points
         Points of the section slopes: "chebyshev" (both faces and the zeros of T_{N-2}),
         "gauss-lobatto" or "equispaced". The space is the same, only the degrees of freedom differ.
-
-    Raises
-    ------
-    InputError
-        If the order is not an integer >= 1.
-    NameUnknown
-        If the family of points is not known.
-
-    References
-    ----------
-    "A series of locking-free beam element models in absolute nodal coordinate formulation",
-    Archive of Applied Mechanics (2024), section 2.
 
     Examples
     --------
@@ -94,12 +85,9 @@ class ElementBeamANCF(ElementBeam):
 class ElementBeamPatelShabana(ElementBeam):
     """Beam element with ``r``, ``r_X``, ``r_Y`` and ``r_YY`` on the axis.
 
-    Its space is that of :class:`ElementBeamANCF` of order 2, with other degrees of freedom.
-
-    References
-    ----------
-    Patel, Shabana: "Locking alleviation in the large displacement analysis of beam elements:
-    the strain split method", Acta Mechanica 229 (2018).
+    Its space is that of :class:`ElementBeamANCF` of order 2, with other degrees of freedom. See
+    Patel, Shabana: "Locking alleviation in the large displacement analysis of beam elements: the
+    strain split method", Acta Mechanica 229 (2018).
 
     Examples
     --------
@@ -126,7 +114,9 @@ class ElementBeamANCFHermite(ElementBeamANCF):
     derivatives along the axis up to order (degree - 1) / 2: for degree 5 ``r``, ``r_X``, ``r_XX``,
     ``r_Y0`` ..., ``r_XY0`` ..., ``r_XXY0`` .... The space is the product of polynomials of that
     degree in X and of degree N in Y. One or two elements of degree 9 and more replace many cubic
-    ones where loads and section are smooth; put nodes where the shear force jumps.
+    ones where loads and section are smooth; put nodes where the shear force jumps. Raises
+    InputError if the order is not an integer >= 1, or the degree is not odd or not from 3 to 15,
+    NameUnknown if the family of points is not known.
 
     Parameters
     ----------
@@ -136,13 +126,6 @@ class ElementBeamANCFHermite(ElementBeamANCF):
         Degree along X: 3, 5, ... 15.
     points
         Points of the section slopes, as for :class:`ElementBeamANCF`.
-
-    Raises
-    ------
-    InputError
-        If the order is not an integer >= 1, or the degree is not odd or not from 3 to 15.
-    NameUnknown
-        If the family of points is not known.
 
     Examples
     --------
@@ -204,7 +187,7 @@ class ElementBeamCable(ElementBeam):
     N = EA (stretch - 1) and M = EI (change of curvature) at any deformation: the nominal stress in
     a fibre is E (stretch - 1), or E / (1 - nu^2) times the same in plane strain. Output is the
     Green-Lagrange strain eps_xx = (stretch^2 - 1) / 2 and the second Piola-Kirchhoff stress S_xx =
-    E (stretch - 1) / stretch.
+    E (stretch - 1) / stretch. Raises InputError if the degree is not odd, or not from 3 to 15.
 
     Parameters
     ----------
@@ -212,11 +195,6 @@ class ElementBeamCable(ElementBeam):
         Degree of the axis along X: 3 (``r``, ``r_X``), 5 (and ``r_XX``; the best for frames and
         point loads), 7, ... 15 (derivatives up to order (degree - 1) / 2). One or two elements of
         degree 9 and more replace many where the loads are smooth.
-
-    Raises
-    ------
-    InputError
-        If the degree is not odd, or not from 3 to 15.
 
     References
     ----------
@@ -293,7 +271,7 @@ def choose_element(mesh: MeshBeam, material: Any, fields: str | Sequence[str] = 
     shear, ``3 E I / (k_s G A L^2)`` of the deflection of a cantilever. A section of order 1 or 2
     omits warping, about ``(h / L)^2 / 10``. Order 3 represents the shear parabola, with an error of
     order ``(h / L)^3``. The result is a quintic cable, or has cubic sections, or linear ones on a
-    beam shorter than 20 heights.
+    beam shorter than 20 heights. Raises NameUnknown if a field is not known.
 
     Parameters
     ----------
@@ -303,11 +281,6 @@ def choose_element(mesh: MeshBeam, material: Any, fields: str | Sequence[str] = 
         Fields of the section that are needed: names from :data:`ORDER_OF_FIELD`.
     tolerance
         Relative error of the deflection due to the theory, without the discretisation error.
-
-    Raises
-    ------
-    NameUnknown
-        If a field is not known.
     """
     require_like("mesh", mesh, "MeshBeam", "height", "lengths")
     require_like("material", material, "Material", "E", "G", "nu")

@@ -168,12 +168,9 @@ class EnhancedContinuum(Formulation):
     """U = 1/2 int eps : diag(E, E, k_s G) : eps dV + 1/2 int eps : (D - diag(E, E)) : eps h b dX.
 
     The second integral is over the axis. This avoids Poisson locking of sections without linear
-    thickness strain, as those of order 1.
-
-    References
-    ----------
-    Gerstmayr, Matikainen, Mikkola: "A geometrically exact beam element based on the absolute
-    nodal coordinate formulation", Multibody System Dynamics 20 (2008), for the split.
+    thickness strain, as those of order 1. See Gerstmayr, Matikainen, Mikkola: "A geometrically
+    exact beam element based on the absolute nodal coordinate formulation", Multibody System
+    Dynamics 20 (2008), for the split.
     """
 
     name = "ecm"
@@ -211,15 +208,12 @@ class Continuum(Formulation):
 class StrainSplit(EnhancedContinuum):
     """eps = a + s with a = eps(X, 0): stress D a + diag(E, E, k_s G) s.
 
-    The energy is 1/2 int (a : D : a + 2 a : D : s + s : D_0 : s) dV with
-    D_0 = diag(E, E, k_s G). Its derivative by s is the stress of the method. Its derivative by a is
-    D (a + s) instead of the same stress: the difference, the Poisson coupling of the mean of s, is
-    of second order and makes the tangent symmetric. With D_0 in the middle term it would be "ecm".
-
-    References
-    ----------
-    Patel, Shabana: "Locking alleviation in the large displacement analysis of beam elements:
-    the strain split method", Acta Mechanica 229 (2018).
+    The energy is 1/2 int (a : D : a + 2 a : D : s + s : D_0 : s) dV with D_0 = diag(E, E, k_s G).
+    Its derivative by s is the stress of the method. Its derivative by a is D (a + s) instead of the
+    same stress: the difference, the Poisson coupling of the mean of s, is of second order and makes
+    the tangent symmetric. With D_0 in the middle term it would be "ecm". See Patel, Shabana:
+    "Locking alleviation in the large displacement analysis of beam elements: the strain split
+    method", Acta Mechanica 229 (2018).
     """
 
     name = "strain-split"

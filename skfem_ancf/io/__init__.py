@@ -299,7 +299,8 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
 
     Its dimensions are "point", "component" (x, y) of vectors, "tensor" (xx, yy, xy), and for a
     History first "time". Coordinates "x" and "y" are reference positions; points all over the body
-    have the coordinate "member", the name of their beam.
+    have the coordinate "member", the name of their beam. Raises MissingExtra if xarray is not
+    installed.
 
     Parameters
     ----------
@@ -314,11 +315,6 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
         ``subdivide`` says.
     subdivide, recover
         As for :func:`skfem_ancf.io.save_vtu`.
-
-    Raises
-    ------
-    MissingExtra
-        If xarray is not installed.
 
     Examples
     --------

@@ -33,7 +33,8 @@ class Material(Immutable):
     :meth:`thickness_stretch` if Cauchy stress is needed. It runs in NumPy; a
     :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial` is compiled. A subclass of a law of
     the package that overrides ``stress`` alone gets the energy by integration of the stress along
-    the strain from zero, and the moduli by the complex step.
+    the strain from zero, and the moduli by the complex step. Raises InputError if a value is out of
+    its range, NameUnknown if ``plane`` or ``shear_correction`` is a name that is not known.
 
     Parameters
     ----------
@@ -59,13 +60,6 @@ class Material(Immutable):
         Stress that the material bears, for the field "utilisation" and :meth:`State.extremes
         <skfem_ancf.State.extremes>`: a positive number, with which the von Mises stress is
         compared, or a pair for the principal stresses in tension and compression (force per area).
-
-    Raises
-    ------
-    InputError
-        If a value is out of its range.
-    NameUnknown
-        If ``plane`` or ``shear_correction`` is a name that is not known.
     """
 
     _title = ""
@@ -102,7 +96,8 @@ class Material(Immutable):
         :mod:`skfem_ancf.materials.library`: steels "S235", "S275", "S355", "S460", "1.4301",
         "spring steel"; "EN AW-6060 T66", "EN AW-6082 T6", "EN AW-7075 T6"; "brass", "Ti-6Al-4V";
         "POM", "PA 6", "PA 66 GF30", "PC", "ABS", "PP", "PETG", "PLA", "silicone". Those that are
-        typical say so in :attr:`title`: ask the data sheet before you rely on them.
+        typical say so in :attr:`title`: ask the data sheet before you rely on them. Raises
+        NameUnknown, InputError if the name, or the units, are not known.
 
         Parameters
         ----------
@@ -113,11 +108,6 @@ class Material(Immutable):
             density is that of time in seconds.
         **changes
             Other arguments of the law, which replace those of the name.
-
-        Raises
-        ------
-        NameUnknown, InputError
-            If the name, or the units, are not known.
 
         Examples
         --------
@@ -178,10 +168,7 @@ class Material(Immutable):
     def replace(self, **changes: Any) -> Material:
         """A copy with changed constructor arguments, as ``replace(E=2e8)``.
 
-        Raises
-        ------
-        NameUnknown
-            If an argument is not known.
+        Raises NameUnknown if an argument is not known.
 
         Examples
         --------

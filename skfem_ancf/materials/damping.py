@@ -13,17 +13,13 @@ class KelvinVoigt(Immutable):
     ``S = S(eps) + time C : d eps / dt`` with the Green-Lagrange strain and the moduli C at zero
     strain. Rigid rotation causes no strain rate and no loss. A free vibration of angular frequency
     omega decays with the damping ratio ``time omega / 2``. The stabilisation of an element stays
-    elastic.
+    elastic. See Linn, Lang, Tuganov: "Geometrically exact Cosserat rods with Kelvin-Voigt type
+    viscous damping", Mechanical Sciences 4 (2013).
 
     Parameters
     ----------
     time
         Retardation time: viscosity over modulus, in units of time; zero or positive.
-
-    References
-    ----------
-    Linn, Lang, Tuganov: "Geometrically exact Cosserat rods with Kelvin-Voigt type viscous
-    damping", Mechanical Sciences 4 (2013).
 
     Examples
     --------

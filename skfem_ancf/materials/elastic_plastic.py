@@ -55,7 +55,8 @@ class ElasticPlastic(HistoryMaterial):
     surface (backward Euler), with the consistent tangent.
 
     Without hardening all points of a section can yield at once, and a hinge then takes all further
-    bending in one element: give a slight hardening, of a thousandth of E.
+    bending in one element: give a slight hardening, of a thousandth of E. See Simo, Hughes:
+    "Computational inelasticity" (1998), boxes 3.2 and 3.3.
 
     Parameters
     ----------
@@ -77,10 +78,6 @@ class ElasticPlastic(HistoryMaterial):
     variables
         ``plastic_strain`` (xx, yy, 2 xy), ``back_stress`` (xx, yy, xy), and ``accumulated``, the
         accumulated plastic strain.
-
-    References
-    ----------
-    Simo, Hughes: "Computational inelasticity" (1998), boxes 3.2 and 3.3.
 
     Examples
     --------

@@ -68,15 +68,12 @@ def neo_hookean(constants, xx, yy, xy):
 class NeoHookean(PointwiseMaterial):
     """W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2.
 
-    For small strains it agrees with Hooke's law of the same ``E`` and ``nu``. Unlike
-    St. Venant-Kirchhoff it resists compression to zero volume. In plane stress S_33 = 0 determines
-    the stretch out of the plane. Parameters and errors are those of
-    :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` is below 1/2.
-
-    References
-    ----------
-    Simo, Pister (1984); Bonet, Wood, "Nonlinear continuum mechanics for finite element
-    analysis", 2nd ed. (2008), section 6.4.3.
+    For small strains it agrees with Hooke's law of the same ``E`` and ``nu``. Unlike St.
+    Venant-Kirchhoff it resists compression to zero volume. In plane stress S_33 = 0 determines the
+    stretch out of the plane. Parameters and errors are those of
+    :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` is below 1/2. See Simo, Pister
+    (1984); Bonet, Wood, "Nonlinear continuum mechanics for finite element analysis", 2nd ed.
+    (2008), section 6.4.3.
 
     Examples
     --------

@@ -12,10 +12,10 @@ from .history import HistoryMaterial
 class Prony(HistoryMaterial):
     """Relaxation of an elastic law by a Prony series: a generalised Maxwell model.
 
-    With the stress S0 of the law, a strain that is held relaxes it to ``S0 (1 - sum g_i (1 -
-    exp(-t / tau_i)))``, and a history of strain superposes such relaxations. In an increment S0
-    changes at a constant rate, for which the stress is exact. At once, as in ``solve_static``, the
-    stress is that of the law.
+    With the stress S0 of the law, a strain that is held relaxes it to ``S0 (1 - sum g_i (1 - exp(-t
+    / tau_i)))``, and a history of strain superposes such relaxations. In an increment S0 changes at
+    a constant rate, for which the stress is exact. At once, as in ``solve_static``, the stress is
+    that of the law. See Simo, Hughes: "Computational inelasticity" (1998), section 10.3.
 
     Parameters
     ----------
@@ -33,10 +33,6 @@ class Prony(HistoryMaterial):
     ----------
     variables
         ``instant``, the stress S0, and ``relaxing``, the stresses of the Maxwell elements.
-
-    References
-    ----------
-    Simo, Hughes: "Computational inelasticity" (1998), section 10.3.
 
     Examples
     --------

@@ -13,12 +13,9 @@ from .base import LinearLaw, Material, hooke
 class StVenantKirchhoff(Material):
     """S = D eps with the energy 1/2 eps : D : eps per volume.
 
-    Parameters and errors are those of :class:`~skfem_ancf.materials.base.Material`.
-
-    References
-    ----------
-    "A series of locking-free beam element models in absolute nodal coordinate formulation",
-    Archive of Applied Mechanics (2024).
+    Parameters and errors are those of :class:`~skfem_ancf.materials.base.Material`. See "A series
+    of locking-free beam element models in absolute nodal coordinate formulation", Archive of
+    Applied Mechanics (2024).
 
     Examples
     --------

@@ -109,6 +109,8 @@ class MeshBeam(NumberedMesh):
                   origin: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> MeshBeam:
         """A straight beam.
 
+        Raises MeshError if ``x`` does not increase, or a height is not positive.
+
         Parameters
         ----------
         x
@@ -120,11 +122,6 @@ class MeshBeam(NumberedMesh):
             The point, shape (2,), at x = 0.
         angle
             Angle of the axis from the first coordinate axis in radians, at most 2 pi in magnitude.
-
-        Raises
-        ------
-        MeshError
-            If ``x`` does not increase, or a height is not positive.
 
         Examples
         --------
@@ -157,7 +154,9 @@ class MeshBeam(NumberedMesh):
         """A beam with a curved reference configuration.
 
         The axis of an element is the cubic through its end points with the unit tangents and the
-        arc length of the curve. :meth:`refined` places new nodes on the curve.
+        arc length of the curve. :meth:`refined` places new nodes on the curve. Raises MeshError if
+        the curve folds (radius of curvature below h/2), jumps, has a kink at a node or a zero
+        derivative, or an element has no length.
 
         Parameters
         ----------
@@ -171,12 +170,6 @@ class MeshBeam(NumberedMesh):
         dr
             Derivative of ``r``; by default the complex step where ``r`` allows it, else
             differences.
-
-        Raises
-        ------
-        MeshError
-            If the curve folds (radius of curvature below h/2), jumps, has a kink at a node or a
-            zero derivative, or an element has no length.
 
         Examples
         --------
@@ -217,6 +210,9 @@ class MeshBeam(NumberedMesh):
         """A beam whose axis is a cubic spline through points, as of a drawing or a measurement.
 
         Where a closed curve ends, weld the ends: ``scene.weld((beam, "left"), (beam, "right"))``.
+        Raises MeshError if adjacent points coincide, or the axis bends too sharply: at a corner
+        weld two beams, FileError if the file cannot be read. See P. Dierckx, Curve and Surface
+        Fitting with Splines, 1993: ``scipy.interpolate.splprep``.
 
         Parameters
         ----------
@@ -231,17 +227,6 @@ class MeshBeam(NumberedMesh):
         noise
             Root mean square distance between axis and points, for measured points: 1.4 times the
             standard deviation of each coordinate.
-
-        Raises
-        ------
-        MeshError
-            If adjacent points coincide, or the axis bends too sharply: at a corner weld two beams.
-        FileError
-            If the file cannot be read.
-
-        References
-        ----------
-        P. Dierckx, Curve and Surface Fitting with Splines, 1993: ``scipy.interpolate.splprep``.
 
         Examples
         --------
@@ -361,11 +346,7 @@ class MeshBeam(NumberedMesh):
 
         Positions, tangents and lengths depend on each other: to change them use :meth:`init_line`,
         :meth:`init_curve`, :meth:`refined`, :meth:`translated`, :meth:`rotated` or :meth:`scaled`.
-
-        Raises
-        ------
-        NameUnknown
-            For another attribute.
+        Raises NameUnknown for another attribute.
 
         Examples
         --------
@@ -498,7 +479,8 @@ class MeshBeam(NumberedMesh):
         """A mesh refined near sections, to resolve boundary layers at supports and loads.
 
         Elements are halved until those within 1.5 heights of the sections are not longer than
-        ``size``, and the others not longer than ``growth`` times their distance from there.
+        ``size``, and the others not longer than ``growth`` times their distance from there. Raises
+        MeshError if a section is not known, or a point is far from the beam.
 
         Parameters
         ----------
@@ -509,11 +491,6 @@ class MeshBeam(NumberedMesh):
             Element length at the sections; a quarter of the height by default.
         growth
             Ratio of element length to distance, positive.
-
-        Raises
-        ------
-        MeshError
-            If a section is not known, or a point is far from the beam.
 
         Examples
         --------

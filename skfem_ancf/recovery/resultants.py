@@ -94,12 +94,7 @@ class Resultants:
         """A ``pandas.DataFrame`` with a row per section, in a motion per instant and section.
 
         Its columns are the attributes, with ``x``, ``y`` and ``force_x``, ``force_y`` for the
-        components of positions and forces.
-
-        Raises
-        ------
-        MissingExtra
-            If pandas is not installed.
+        components of positions and forces. Raises MissingExtra if pandas is not installed.
 
         Examples
         --------

@@ -498,6 +498,7 @@ class Output:
         """The places where a field is largest in magnitude, two heights or more from each other.
 
         Components of a domain are in global axes; places in it are a tenth of its size apart.
+        Raises InputError if the field has no value, as the utilisation without a strength.
 
         Parameters
         ----------
@@ -510,11 +511,6 @@ class Output:
             Beam or domain, its name or number; by default all that have the field.
         recover
             Recovered strain and stress if available.
-
-        Raises
-        ------
-        InputError
-            If the field has no value, as the utilisation without a strength.
 
         Examples
         --------

@@ -337,12 +337,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     def replace(self, **changes: Any) -> State:
         """A copy with changed attributes, as ``replace(message="guess")``.
 
-        ``error_estimate``, ``scene`` and ``refinements`` are those of an adaptive solution.
-
-        Raises
-        ------
-        NameUnknown
-            If an attribute is not known.
+        ``error_estimate``, ``scene`` and ``refinements`` are those of an adaptive solution. Raises
+        NameUnknown if an attribute is not known.
         """
         known = [name for name in vars(self) if not name.startswith("_")]
         known += [name for name in ("error_estimate", "scene", "refinements")
@@ -458,11 +454,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
 
         In a domain the components are in global axes. For a linear solution the linear strain.
-
-        Raises
-        ------
-        InputError
-            If several lines or beams are equally near to a point, as at a node.
+        Raises InputError if several lines or beams are equally near to a point, as at a node.
         """
         def of(part):
             if not isinstance(part, BeamPoints):
@@ -673,6 +665,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
                    line: int | None = None, sections: int = ALONG_ELEMENT) -> Resultants:
         """Normal force, shear force and bending moment along a beam, with the strains of its axis.
 
+        Raises InputError if several lines or beams are equally near to a point, as at a node.
+
         Parameters
         ----------
         at
@@ -680,11 +674,6 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
             sections in each element, and both sides of forces between nodes.
         sections
             Number of sections in each element without ``at``, its ends included.
-
-        Raises
-        ------
-        InputError
-            If several lines or beams are equally near to a point, as at a node.
 
         Examples
         --------
@@ -720,6 +709,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
                 on: WhichMember = None) -> Contact:
         """Contact points and pressures of obstacles, and of members that touch each other.
 
+        Raises InputError if there is no contact.
+
         Parameters
         ----------
         obstacle
@@ -728,11 +719,6 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         on
             The member whose surface it is, by object, name or number; None for all, with the forces
             on both sides of members that touch each other.
-
-        Raises
-        ------
-        InputError
-            If there is no contact.
         """
         return contact_of(self, obstacle, on)
 

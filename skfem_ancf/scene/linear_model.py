@@ -115,18 +115,16 @@ class LinearModel:
     def state_space(self, modes: int | None = None) -> StateSpace:
         """Matrices of the state space, joints and supports eliminated.
 
+        Raises InputError if a material has no density, an output is the force of a joint, or the
+        velocity or acceleration that a prescribed motion causes at once: it needs the rate of the
+        input.
+
         Parameters
         ----------
         modes
             Reduce to this number of lowest modes, with the static response of all others in D; by
             default all coordinates. With modes the numbers of slender beams are more accurate, as
             the assembled stiffness has the round-off of (L / h)^2.
-
-        Raises
-        ------
-        InputError
-            If a material has no density, an output is the force of a joint, or the velocity or
-            acceleration that a prescribed motion causes at once: it needs the rate of the input.
         """
         if np.any(self.readings.multipliers):
             raise InputError("joints are eliminated from a state space, and an output is the force "

@@ -52,7 +52,9 @@ class MotionDesign(Design):
     the scheme [1]. ``jacobian`` has those of all readings at all steps, forward in time, at the
     cost of about a motion for each parameter: use it for up to ten. ``objective`` has those of one
     number, as a final value or an integral, by one adjoint solution backward in time for any number
-    of parameters. Both are as in a :class:`Design`, for readings at all steps.
+    of parameters. Both are as in a :class:`Design`, for readings at all steps. Raises InputError
+    for other schemes; with contact, materials with a history, and prescribed motions that depend on
+    the parameters; for "energy-momentum" also with sliders.
 
     Parameters
     ----------
@@ -80,12 +82,6 @@ class MotionDesign(Design):
     history
         The last :class:`~skfem_ancf.History`. Readings are those of its sensors at all steps, one
         after the other: ``design.values(p).reshape(len(design.history.sensors.t), -1)``.
-
-    Raises
-    ------
-    InputError
-        For other schemes; with contact, materials with a history, and prescribed motions that
-        depend on the parameters; for "energy-momentum" also with sliders.
 
     References
     ----------

@@ -131,17 +131,14 @@ class Steps(Immutable):
     def ramp(self, start: ArrayLike | None = None, /, **values: ArrayLike) -> Ramp:
         """A function of time from values at the ends of steps, linear within each step.
 
+        Raises NameUnknown, InputError if a step is unknown, or if there is no value.
+
         Parameters
         ----------
         start
             The value at time 0: a number or a vector, shape (k,); zero by default.
         **values
             Values at the ends of steps by name; in steps without a value it is constant.
-
-        Raises
-        ------
-        NameUnknown, InputError
-            If a step is unknown, or if there is no value.
         """
         for name in values:
             require_option("step", name, self.names)

@@ -293,14 +293,8 @@ class Scene(Model):
         displacements, rotations, section forces, reactions on the undeformed body; the strain
         energy is ``u . K u / 2``. Loads keep the direction of the reference configuration.
         ``state.stability`` is None, see :meth:`buckling`; ``state.checks`` tells whether rotations
-        are small; ``state.base`` is the reference configuration.
-
-        Raises
-        ------
-        SupportError
-            If a rigid motion is not constrained.
-        InputError
-            If the solution penetrates an obstacle.
+        are small; ``state.base`` is the reference configuration. Raises SupportError if a rigid
+        motion is not constrained, InputError if the solution penetrates an obstacle.
         """
         with self._lock:
             system = self.system
@@ -332,6 +326,9 @@ class Scene(Model):
                      max_elements: int = MOST_ELEMENTS, max_degree: int = DEGREES[-1]) -> State:
         """The equilibrium under full load.
 
+        Raises SupportError if a rigid motion is not constrained, ConvergenceError if there is no
+        convergence; its ``state`` is the last converged State.
+
         Parameters
         ----------
         start
@@ -349,13 +346,6 @@ class Scene(Model):
         goal, max_elements, max_degree
             For ``adapt``: the error of the "displacement" or of the "strain", see
             :func:`skfem_ancf.scene.adapt.solve_adaptive`; limits of refinement.
-
-        Raises
-        ------
-        SupportError
-            If a rigid motion is not constrained.
-        ConvergenceError
-            If there is no convergence; its ``state`` is the last converged State.
 
         Warns
         -----
@@ -467,6 +457,10 @@ class Scene(Model):
                      progress: bool | None = None) -> Path:
         """The equilibrium path through limit and snap-back points, by arc length.
 
+        Raises InputError if an argument is out of range or the branch point belongs to another
+        scene, ConvergenceError if the path cannot be followed further; its ``state`` is the Path so
+        far.
+
         Parameters
         ----------
         branch
@@ -474,13 +468,6 @@ class Scene(Model):
             there.
         steps, ds, ds_max, max_load, until, tol, max_iterations, locate, side, progress
             As for :func:`skfem_ancf.solvers.continuation`.
-
-        Raises
-        ------
-        InputError
-            If an argument is out of range or the branch point belongs to another scene.
-        ConvergenceError
-            If the path cannot be followed further; its ``state`` is the Path so far.
 
         Examples
         --------
@@ -520,6 +507,8 @@ class Scene(Model):
                   outputs: Sequence[str | Sensor] | None = None) -> LinearModel:
         """A linear model about a state, for control, transfer functions and frequency responses.
 
+        Raises InputError if an input or output cannot be linearised, or the state moves.
+
         Parameters
         ----------
         state
@@ -531,11 +520,6 @@ class Scene(Model):
             angle is the input. A list, or a dict with their names.
         outputs
             Names of sensors of the scene, see :meth:`sensor`; all of them by default.
-
-        Raises
-        ------
-        InputError
-            If an input or output cannot be linearised, or the state moves.
 
         Examples
         --------
@@ -945,6 +929,10 @@ class Scene(Model):
     def buckling(self, k: int = 1, state: State | None = None) -> Buckling:
         """The k lowest buckling load factors and their shapes.
 
+        Raises InputError if there is no positive factor, or loads without a potential cause flutter
+        first; if the state is unstable or has other supports, SupportError if a rigid motion is not
+        constrained.
+
         Parameters
         ----------
         k
@@ -954,14 +942,6 @@ class Scene(Model):
             loads of this scene, added to it. It may be one of a scene with the same beams, supports
             and joints and other loads. By default the equilibrium without loads, in which
             prestressed springs act, and energies with ``scaled=False``.
-
-        Raises
-        ------
-        InputError
-            If there is no positive factor, or loads without a potential cause flutter first; if the
-            state is unstable or has other supports.
-        SupportError
-            If a rigid motion is not constrained.
 
         Examples
         --------

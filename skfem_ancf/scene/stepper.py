@@ -150,16 +150,13 @@ class Stepper:
     def step(self, inputs: ArrayLike = ()) -> Stepper:
         """Take a step.
 
+        Raises ConvergenceError if the step fails, halved steps too; the stepper stays where it was.
+
         Parameters
         ----------
         inputs
             Sizes of the inputs in this step, shape (k,), in the order of :attr:`inputs`; a
             prescribed position has two numbers.
-
-        Raises
-        ------
-        ConvergenceError
-            If the step fails, halved steps too; the stepper stays where it was.
         """
         plain = type(inputs) is np.ndarray and inputs.dtype == float and np.isfinite(inputs).all()
         given = np.atleast_1d(inputs if plain else require_finite("inputs", inputs))  # 10 us less

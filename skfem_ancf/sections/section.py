@@ -342,7 +342,9 @@ class Section(Immutable):
 
         The rules across are Gauss rules of the width, exact to round-off for the polynomials of the
         element: see :class:`~skfem_ancf.sections.section.Weighted`. The axis is at half the height,
-        which is not the centroid of a T: its extension and bending are coupled.
+        which is not the centroid of a T: its extension and bending are coupled. Raises NameUnknown
+        if the name is not known, CallError if it takes other sizes, InputError if a size is not
+        positive or walls do not fit; for the height when the Beam is made.
 
         Parameters
         ----------
@@ -358,15 +360,6 @@ class Section(Immutable):
             Unit of length of a standard profile: "m", "cm", "mm" or "in".
         **sizes
             Overall width, thickness of the web, of a flange and of the walls, in units of length.
-
-        Raises
-        ------
-        NameUnknown
-            If the name is not known.
-        CallError
-            If it takes other sizes.
-        InputError
-            If a size is not positive or walls do not fit; for the height when the Beam is made.
 
         Examples
         --------
@@ -389,7 +382,9 @@ class Section(Immutable):
     def layers(*layers: Any, width: float | Callable[..., Any] | None = None) -> Section:
         """Bonded layers from bottom to top, whose total thickness is the height of the mesh.
 
-        Strains are continuous. Each layer has the stress of its material.
+        Strains are continuous. Each layer has the stress of its material. Raises InputError if a
+        layer is no such pair or is not positive; when the Beam is made, if the thicknesses do not
+        add up to the height.
 
         Parameters
         ----------
@@ -400,12 +395,6 @@ class Section(Immutable):
         width
             Width of the other layers: a positive number, or a function of material coordinates (x,
             y).
-
-        Raises
-        ------
-        InputError
-            If a layer is no such pair or is not positive; when the Beam is made, if the thicknesses
-            do not add up to the height.
 
         Examples
         --------
@@ -425,7 +414,10 @@ class Section(Immutable):
 
         Sections stay plane and keep their size. So an element with sections of a higher order is
         replaced by that of order 1 with the same axis; ``beam.element`` is the one in use. The
-        formulation is "assumed".
+        formulation is "assumed". Raises InputError if a number is not positive; when the Beam is
+        made, if a user-defined element has an order above 1. See Simo: "A finite strain beam
+        formulation. The three-dimensional dynamic problem. Part I", Computer Methods in Applied
+        Mechanics and Engineering 49 (1985).
 
         Parameters
         ----------
@@ -438,17 +430,6 @@ class Section(Immutable):
             Mass per length, and rotary inertia per length; rhoI is rhoA EI / EA by default.
         width
             Width of the faces, on which pressures and tractions act.
-
-        Raises
-        ------
-        InputError
-            If a number is not positive; when the Beam is made, if a user-defined element has an
-            order above 1.
-
-        References
-        ----------
-        Simo: "A finite strain beam formulation. The three-dimensional dynamic problem. Part I",
-        Computer Methods in Applied Mechanics and Engineering 49 (1985).
 
         Examples
         --------
@@ -467,15 +448,12 @@ class Section(Immutable):
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         """The layers on the mesh of a beam, from bottom to top.
 
+        Raises InputError if the section does not fit the height of the mesh.
+
         Parameters
         ----------
         mesh, material
             Those of the beam; the material is None if the section has materials.
-
-        Raises
-        ------
-        InputError
-            If the section does not fit the height of the mesh.
         """
         raise NotImplementedError
 

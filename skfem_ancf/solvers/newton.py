@@ -66,7 +66,10 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     one finds a stable equilibrium; the message of the result says which. ``method="mixed"`` and
     ``method="newton"`` use one iteration and load steps: the first is ``first_step`` of the load, a
     failed step is cut to a quarter, an easy step doubles the next. When an iteration has converged
-    is said by :mod:`skfem_ancf.equations.convergence`.
+    is said by :mod:`skfem_ancf.equations.convergence`. See Magisano, Leonetti, Garcea: "How to
+    improve efficiency and robustness of the Newton method in geometrically non-linear structural
+    problem discretized via displacement-based finite elements", Computer Methods in Applied
+    Mechanics and Engineering 313 (2017).
 
     Parameters
     ----------
@@ -100,12 +103,6 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     ConvergenceError
         If no strategy finds an equilibrium. The error lists those tried; its ``state`` is the
         converged ``StaticResult`` of the highest load.
-
-    References
-    ----------
-    Magisano, Leonetti, Garcea: "How to improve efficiency and robustness of the Newton method in
-    geometrically non-linear structural problem discretized via displacement-based finite
-    elements", Computer Methods in Applied Mechanics and Engineering 313 (2017).
     """
     require_option("method", method, METHODS)
     require_flag("stable", stable)

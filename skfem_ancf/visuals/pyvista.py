@@ -76,6 +76,8 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
                out: Any = None) -> Any:
     """The body of a state as a pyvista grid.
 
+    Raises InputError if ``out`` has other members.
+
     Parameters
     ----------
     state
@@ -94,11 +96,6 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
     pyvista.UnstructuredGrid, or pyvista.MultiBlock
         Of one beam, or of several and of the outlines of rigid bodies and obstacles by name; of a
         scene with contact "contact" has the contact points.
-
-    Raises
-    ------
-    InputError
-        If ``out`` has other members.
     """
     pv, found = _pyvista(), grids(state, subdivide, lagrange, recover)
     wanted = list(FIELDS.values()) if fields is None else find_fields(fields)

@@ -456,7 +456,10 @@ class Drag(ForceElement):
     """Quadratic drag per length of the axis in a medium at rest.
 
     ``-density width / 2 (normal |v_n| v_n + tangential |v_t| v_t)`` per length of the reference
-    axis, with the velocities across and along the axis.
+    axis, with the velocities across and along the axis. See Taylor: "Analysis of the swimming of
+    long and narrow animals", Proceedings of the Royal Society A 214 (1952); Morison, O'Brien,
+    Johnson, Schaaf: "The force exerted by surface waves on piles", Petroleum Transactions 189
+    (1950).
 
     Parameters
     ----------
@@ -466,12 +469,6 @@ class Drag(ForceElement):
         Drag coefficients, zero or positive.
     beam
         Beam, name or number; None for all.
-
-    References
-    ----------
-    Taylor: "Analysis of the swimming of long and narrow animals", Proceedings of the Royal Society
-    A 214 (1952); Morison, O'Brien, Johnson, Schaaf: "The force exerted by surface waves on piles",
-    Petroleum Transactions 189 (1950).
     """
 
     distributed = True

@@ -301,7 +301,9 @@ class Sleeve(Joint):
     With the point p and its closest point c(s) on the axis, ``c'(s) . (p - c(s)) = 0``, the
     equation is ``c'(s) x (p - c(s)) = 0``, with the derivative c' by the reference length. Thus s
     is not an unknown, and the multiplier is the normal force over the stretch of the axis. With
-    ``angle`` the section of the point keeps its angle to c'.
+    ``angle`` the section of the point keeps its angle to c'. See Hong, Ren: "Modeling of sliding
+    joint on one-dimensional flexible medium", Multibody System Dynamics 26 (2011), with s as an
+    unknown.
 
     Parameters
     ----------
@@ -312,11 +314,6 @@ class Sleeve(Joint):
         The beam along which it slides, its name or number.
     angle
         Keep the angle: the sleeve transmits a moment.
-
-    References
-    ----------
-    Hong, Ren: "Modeling of sliding joint on one-dimensional flexible medium", Multibody System
-    Dynamics 26 (2011), with s as an unknown.
     """
 
     constant = tabled = False

@@ -70,7 +70,10 @@ class Glue(Joint):
     For each test function of the domain on the boundary, its integral times the difference of the
     displacements is zero: the trace of the domain is the L2 projection of the other displacement.
     The other member may be the end or a side of a beam with sections, a rigid body, another domain
-    or the ground. The equations are linear and constant.
+    or the ground. The equations are linear and constant. Raises InputError if a point of the
+    boundary is not on the other member at that place. See Bernardi, Maday, Patera: "A new
+    nonconforming approach to domain decomposition: the mortar element method", in: Nonlinear
+    partial differential equations and their applications (1994).
 
     Parameters
     ----------
@@ -80,16 +83,6 @@ class Glue(Joint):
         The other member, and for a beam its place, as "left" or "top".
     name
         Name in messages.
-
-    Raises
-    ------
-    InputError
-        If a point of the boundary is not on the other member at that place.
-
-    References
-    ----------
-    Bernardi, Maday, Patera: "A new nonconforming approach to domain decomposition: the mortar
-    element method", in: Nonlinear partial differential equations and their applications (1994).
     """
 
     def __init__(self, domain: Any, boundary: Any, other: Any, place: Any = None,
