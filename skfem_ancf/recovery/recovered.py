@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import partial, wraps
 from itertools import pairwise
 from typing import Any
 
@@ -71,6 +71,7 @@ INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 
 def _by_rows(function):
     """A linear function of real values (n, k) as one of (..., n, m), which may be complex."""
+    @wraps(function)
     def applied(self, values):
         rows = np.ascontiguousarray(values.swapaxes(0, -2))
         found = function(self, rows.reshape(len(rows), -1).view(float))
