@@ -144,33 +144,29 @@ def test_loops_are_arrays(kind, mesh):
             eigen = 1e-3 * np.cos(np.arange(3.0 * t.weights.shape[1] * len(t.start)))
         f, g, A, B, S, T = (np.zeros(n) for n in (k.N, k.N, k.N * ld, k.N * ld, ns, ns))
         D, E = np.zeros((2, 4 * ns * k.nd))
-        for one, other, *both in (
-                ((runs.run_force, u), (loops.force, u, none, none, none), (f, g)),
-                ((runs.run_stress, u), (loops.force, u, none, none), (S, T)),
-                ((runs.run_mixed, u, given), (loops.force, u, none, given), (S, T), (f, g)),
-                ((runs.run_given, u, given), (loops.force, u, none, given, none), (f, g)),
-                ((runs.run_mean, u, v), (loops.force, u, v, none, none), (f, g)),
-                ((runs.run_mean_mixed, u, v, given), (loops.force, u, v, given), (S, T), (f, g)),
-                ((runs.run_linearised, u, v, given), (loops.linearised, u, v, given), (S, T)),
-                ((runs.run_viscous, u, v), (loops.linearised, u, v, none, none), (f, g)),
-                *(((runs.run_tangent, u, x), (loops.run_tangent, u, x), (S, T), (f, g), (A, B))
-                  for x in (none, given)),
-                ((runs.run_unsymmetric, u, v), (loops.run_unsymmetric, u, v), (A, B)),
-                ((runs.run_gradients, u), (loops.run_gradients, u), (D, E)),
-                ((runs.run_eigen_force, u, eigen),
-                 (loops.force, u, none, eigen, none) if linear else (loops.eigen_mean, u, u, eigen),
-                 (f, g)),
-                ((runs.run_eigen_mean, u, v, eigen),
-                 (loops.force, u, v, eigen, none) if linear else (loops.eigen_mean, u, v, eigen),
-                 (f, g)),
-                ((runs.run_eigen_tangent, u, eigen), (loops.run_eigen_tangent, u, eigen), (A, B))):
-            for function, table, place in ((one, x, 0), (other, y, 1)):
+        for one, *both in (
+                ((runs.run_force, u, none, none, none), (f, g)),
+                ((runs.run_force, u, none, none), (S, T)),
+                ((runs.run_force, u, none, given), (S, T), (f, g)),
+                ((runs.run_force, u, none, given, none), (f, g)),
+                ((runs.run_force, u, v, none, none), (f, g)),
+                ((runs.run_force, u, v, given), (S, T), (f, g)),
+                ((runs.run_linearised, u, v, given), (S, T)),
+                ((runs.run_linearised, u, v, none, none), (f, g)),
+                *(((runs.run_tangent, u, x), (S, T), (f, g), (A, B)) for x in (none, given)),
+                ((runs.run_unsymmetric, u, v), (A, B)),
+                ((runs.run_gradients, u), (D, E)),
+                ((runs.run_eigen_force, u, none, eigen), (f, g)),
+                ((runs.run_eigen_force, u, v, eigen), (f, g)),
+                ((runs.run_eigen_tangent, u, eigen), (A, B))):
+            run = one[0]
+            for function, table, place in ((run, x, 0), (getattr(loops, run.__name__), y, 1)):
                 for pair in both:
                     pair[place][:] = 0.0
                 rest = [ld] * (both[-1][0] is A)
-                if function[0] in (loops.force, loops.linearised) and both[-1][0] is S:
+                if run in (runs.run_force, runs.run_linearised) and both[-1][0] is S:
                     rest = [none]  # without forces
-                function[0](table, *function[1:], *(pair[place] for pair in both), *rest)
+                function(table, *one[1:], *(pair[place] for pair in both), *rest)
             for a, b in both:  # forces and tangents of one term of the energy may cancel
                 least = stiff if a is A else stiff * np.abs(u).max() if a is f else 0.0
                 assert a.any() and np.abs(a - b).max() <= 1e-12 * max(least, np.abs(a).max())

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.band import Band, add_multiple, clear, copy, mirror
-from ..beam.strain_energy import (FlatBody, add_eigen_force, add_eigen_mean, add_eigen_tangent,
+from ..beam.strain_energy import (FlatBody, add_eigen_force, add_eigen_tangent,
                                   put_eigenstrains)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import FORCE, JOINTS, MEAN_FORCE, STIFFNESS, call_custom
@@ -177,10 +177,7 @@ def carry_eigenstrains(loads, factors):
 def _add_eigen_force(loads, factors, u, v, out):
     """Add the force of eigenstrains, or, with v, its mean from u to v."""
     f, given = np.zeros(u.size), _eigenstrains(loads, factors)
-    if v.size > 0:
-        add_eigen_mean(loads.eigenstrained, u, v, given, f)
-    else:
-        add_eigen_force(loads.eigenstrained, u, given, f)
+    add_eigen_force(loads.eigenstrained, u, v, given, f)
     add_multiple(-1.0, f, out)
 
 

@@ -11,10 +11,9 @@ from .beam import Beam
 from .kernels.elements import Elements
 from .kernels.histories import Past, elements_of, remembering
 from .kernels.law import LINEAR
-from .kernels.runs import (add_changes, add_transposed, run_accept, run_eigen_force, run_eigen_mean,
-                           run_eigen_tangent, run_force, run_given, run_gradients, run_linearised,
-                           run_mean, run_mean_mixed, run_mixed, run_put, run_stress, run_tangent,
-                           run_unsymmetric, run_viscous)
+from .kernels.runs import (add_changes, add_transposed, run_accept, run_eigen_force,
+                           run_eigen_tangent, run_force, run_gradients, run_linearised, run_put,
+                           run_tangent, run_unsymmetric)
 from .kernels.tables import CABLE, StrainTables, repeated, together
 
 #: Columns of the table of a body: begin and end of stresses; samples and DOFs of an element; begin
@@ -149,10 +148,16 @@ def _gradients(body, k, gradients):
 
 
 @source
+def _add_force(body, u0, u1, given, out, f):
+    """Add forces and write stresses of all tables, see :func:`~.kernels.runs.run_force`."""
+    for k in range(body.table.shape[0]):
+        run_force(tables_of(body, k), u0, u1, _stress(body, k, given), _stress(body, k, out), f)
+
+
+@source
 def body_force(body, u, f):
     clear(f)
-    for k in range(body.table.shape[0]):
-        run_force(tables_of(body, k), u, f)
+    _add_force(body, u, u[:0], u[:0], u[:0], f)
 
 
 @source
@@ -169,8 +174,8 @@ def body_tangent(body, u, f, independent, use_independent, stresses, A):
 
 @source
 def body_stress(body, u, stresses):
-    for k in range(body.table.shape[0]):
-        run_stress(tables_of(body, k), u, _stress(body, k, stresses))
+    """The stresses at u."""
+    _add_force(body, u, u[:0], u[:0], stresses, u[:0])
 
 
 @source
@@ -188,7 +193,7 @@ def body_linearised(body, u, du, stresses, independent):
     """Stresses at u plus their linearised change by du."""
     for k in range(body.table.shape[0]):
         run_linearised(tables_of(body, k), u, du, _stress(body, k, stresses),
-                       _stress(body, k, independent))
+                       _stress(body, k, independent), u[:0])
 
 
 @source
@@ -204,15 +209,14 @@ def add_viscous_stress(viscous, body, copies, k, u, v, scratch, out):
 @source
 def add_viscous_force(body, u, v, f):
     for k in range(body.table.shape[0]):
-        run_viscous(tables_of(body, k), u, v, f)
+        run_linearised(tables_of(body, k), u, v, u[:0], u[:0], f)
 
 
 @source
 def body_mean(body, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the strain energy."""
     clear(f)
-    for k in range(body.table.shape[0]):
-        run_mean(tables_of(body, k), u0, u1, f)
+    _add_force(body, u0, u1, u0[:0], u0[:0], f)
 
 
 @source
@@ -220,18 +224,13 @@ def body_mixed(body, mean, u0, u1, f, independent, stresses):
     """As :func:`body_force` at u1, or :func:`body_mean`, but for independent stresses. The stresses
     of the strain are written."""
     clear(f)
-    for k in range(body.table.shape[0]):
-        given, out = _stress(body, k, independent), _stress(body, k, stresses)
-        if mean:
-            run_mean_mixed(tables_of(body, k), u0, u1, given, out, f)
-        else:
-            run_mixed(tables_of(body, k), u1, given, out, f)
+    _add_force(body, u0 if mean else u1, u1 if mean else u1[:0], independent, stresses, f)
 
 
 @source
 def add_force_of(body, u, stresses, f):
-    for k in range(body.table.shape[0]):
-        run_given(tables_of(body, k), u, _stress(body, k, stresses), f)
+    """Add the force at u of given stresses."""
+    _add_force(body, u, u[:0], stresses, u[:0], f)
 
 
 @source
@@ -299,17 +298,13 @@ def put_eigenstrains(body, given):
 
 
 @source
-def add_eigen_force(body, u, given, f):
-    """Add the change of the force at u by eigenstrains, see :func:`eigenstrain_body_of`."""
-    for k in range(body.table.shape[0]):
-        run_eigen_force(tables_of(body, k), u, _stress(body, k, given), f)
+def add_eigen_force(body, u, v, given, f):
+    """Add the change of the force at u by eigenstrains, see :func:`eigenstrain_body_of`.
 
-
-@source
-def add_eigen_mean(body, u0, u1, given, f):
-    """Add the change of the mean force from u0 to u1."""
+    With v, it is that of the mean force from u to v.
+    """
     for k in range(body.table.shape[0]):
-        run_eigen_mean(tables_of(body, k), u0, u1, _stress(body, k, given), f)
+        run_eigen_force(tables_of(body, k), u, v, _stress(body, k, given), f)
 
 
 @source

@@ -13,8 +13,7 @@ from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements
 from .histories import ElementsWithHistory, Past, elements_of, remembering
 from .law import LINEAR, law_evaluate
-from .runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
-                   run_gradients, run_mean, run_stress, run_tangent)
+from .runs import run_eigen_force, run_eigen_tangent, run_force, run_gradients, run_tangent
 from .tables import StrainTables, apart, repeated, scaled
 
 #: Approximate number of elements whose energies are evaluated together.
@@ -111,15 +110,16 @@ class ElementKernel:
     def forces(self, u: Array) -> Array:
         """Internal forces of the elements, linearised for a complex u."""
         if not np.iscomplexobj(u):
-            return self._forces(self._apart, run_force, u)
+            return self._forces(u)
         return self.forces(u.real) + 1j * self._times(self.tangents(u.real), u.imag)
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """The force (N,) whose work from u0 to u1 is the change of the energy."""
-        return self.scatter(self._forces(self._apart, run_mean, u0, u1))
+        return self.scatter(self._forces(u0, u1))
 
     def forces_of(self, stresses: list[Array], u: Array) -> Array:
-        return self._forces(self._apart, run_given, u, given=stresses)
+        """Element forces of given stresses."""
+        return self._forces(u, given=stresses)
 
     def eigenstrain_forces(self, given: list[Array], u: Array, end: Array | None = None) -> Array:
         """Change of :meth:`forces`, or of their mean from u to ``end``, by eigenstrains. ``given``
@@ -128,19 +128,23 @@ class ElementKernel:
         if np.iscomplexobj(u):
             return self.eigenstrain_forces(given, u.real) + 1j * self._times(
                 self.eigenstrain_tangents(given, u.real), u.imag)
-        run = run_eigen_force if end is None else run_eigen_mean
-        return self._forces(self._apart, run, u, end, given)
+        return self._forces(u, end, given, eigen=True)
 
     def eigenstrain_tangents(self, given: list[Array], u: Array) -> Array:
         """Change of the :meth:`tangents` by eigenstrains, see :meth:`eigenstrain_forces`."""
         return self._tangents(run_eigen_tangent, u, self._apart, given)
 
-    def _forces(self, elements, run, u, v=None, given=None):
-        """Element forces by a kernel of :mod:`.runs`."""
-        u = [self.gather(self._checked(x)).ravel() for x in (u, v) if x is not None]
-        out = np.zeros_like(u[0])
-        for k, e in enumerate(elements):
-            run(e, *u, *([] if given is None else [given[k].ravel()]), out)
+    def _forces(self, u, v=None, given=None, eigen=False):
+        """Element forces at u, or means from u to v, of the strain, or of given stresses."""
+        u = self.gather(self._checked(u)).ravel()
+        v = u[:0] if v is None else self.gather(self._checked(v)).ravel()
+        out = np.zeros_like(u)
+        for k, e in enumerate(self._apart):
+            T = u[:0] if given is None else given[k].ravel()
+            if eigen:
+                run_eigen_force(e, u, v, T, out)
+            else:
+                run_force(e, u, v, T, u[:0], out)
         return out.reshape(self.t.shape[1], -1, 2)
 
     def _times(self, K, u):
@@ -205,7 +209,7 @@ class ElementKernel:
         for e in self.elements:
             both, T = np.empty((2, ne, e.ns, n)), np.empty((ne, e.ns))
             run_gradients(e, u, both.reshape(-1))
-            run_stress(e, u, T.reshape(-1))
+            run_force(e, u, u[:0], u[:0], T.reshape(-1), u[:0])
             found.append(both)
             stresses.append(T)
         if self.constant is not None:

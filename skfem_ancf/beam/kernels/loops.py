@@ -15,7 +15,7 @@ from .law import LINEAR, conserve, law_evaluate
 
 
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
-def force(t, u, v, given, out, f):
+def run_force(t, u, v, given, out, f):
     """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
     Given stresses act in place of those of the strain; without ``out``, they act without the
     constant stiffness."""
@@ -49,32 +49,8 @@ def force(t, u, v, given, out, f):
             add_forces_of(t, first, D, T, U if whole else U[:0], B, F, f)
 
 
-def run_force(t, u, f):
-    force(t, u, u[:0], u[:0], u[:0], f)
-
-
-def run_stress(t, u, out):
-    force(t, u, u[:0], u[:0], out, u[:0])
-
-
-def run_mixed(t, u, given, out, f):
-    force(t, u, u[:0], given, out, f)
-
-
-def run_given(t, u, given, f):
-    force(t, u, u[:0], given, u[:0], f)
-
-
-def run_mean(t, u, v, f):
-    force(t, u, v, u[:0], u[:0], f)
-
-
-def run_mean_mixed(t, u, v, given, out, f):
-    force(t, u, v, given, out, f)
-
-
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
-def linearised(t, u, du, given, out, f):
+def run_linearised(t, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     work, samples = np.empty((2 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
@@ -93,14 +69,6 @@ def linearised(t, u, du, given, out, f):
             put(t, first, T, given, out)
         if f.size > 0:
             add_forces_of(t, first, D, T, U[:0], B, F, f)
-
-
-def run_linearised(t, u, du, given, out):
-    linearised(t, u, du, given, out, u[:0])
-
-
-def run_viscous(t, u, v, f):
-    linearised(t, u, v, u[:0], u[:0], f)
 
 
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1, int)
@@ -307,18 +275,11 @@ def eigen_mean(t, u, v, shift, f):
         add_forces_of(t, first, D, T, U[:0], B, U, f)
 
 
-def run_eigen_force(t, u, given, f):
+def run_eigen_force(t, u, v, given, f):
     if t.law.kind == LINEAR:
-        force(t, u, u[:0], given, u[:0], f)
+        run_force(t, u, v, given, u[:0], f)
     else:
-        eigen_mean(t, u, u, given, f)
-
-
-def run_eigen_mean(t, u, v, given, f):
-    if t.law.kind == LINEAR:
-        force(t, u, v, given, u[:0], f)
-    else:
-        eigen_mean(t, u, v, given, f)
+        eigen_mean(t, u, v if v.size > 0 else u, given, f)
 
 
 @apart("eigenstrains", CompiledTables, F1, F1, F1, int)

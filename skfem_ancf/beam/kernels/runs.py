@@ -23,76 +23,53 @@ def _put(e, T, out):
     out.reshape(e.ne, e.ns)[:] = T.T
 
 
-def _mean(e, u, v):
-    """Middle of the relative DOFs, directions, middle and change of the strain from u to v."""
+def _moved(e, u, v):
+    """Relative DOFs, change of the rows from the reference, that from u to v, and directions.
+
+    With v, DOFs and directions are means from u to v; without it, the second change is None.
+    """
     U, d, one = e.at(u)
+    if not v.size:
+        return U, (d, one), None, e.directions(one, one)
     dU = e.relative(v - u)
     dd = e.rows(dU)
-    Y = e.directions(one, e.measured(e.x + d + dd))
-    change = e.change(Y, dd)
-    return U + 0.5 * dU, Y, e.strain(d, one) + 0.5 * change, change
+    return U + 0.5 * dU, (d, one), dd, e.directions(one, e.measured(e.x + d + dd))
+
+
+def _strain(e, at, dd, Y):
+    """The strain, in the middle, and its change or None."""
+    strain, change = e.strain(*at), None if dd is None else e.change(Y, dd)
+    return strain if change is None else strain + 0.5 * change, change
 
 
 @kernel
-def run_force(e, u, f):
-    U, d, one = e.at(u)
-    e.add(e.force(e.directions(one, one), e.stress(e.strain(d, one)), U), f)
+def run_force(e, u, v, given, out, f):
+    """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
+
+    Given stresses act in place of those of the strain; without ``out``, they act without the
+    constant stiffness.
+    """
+    U, at, dd, Y = _moved(e, u, v)
+    T, whole = None, out.size > 0 or given.size == 0
+    if whole:
+        T = e.stress(*_strain(e, at, dd, Y))
+    if out.size:
+        _put(e, T, out)
+    if f.size:
+        e.add(e.force(Y, _given(e, given) if given.size else T, U if whole else None), f)
 
 
 @kernel
-def run_stress(e, u, out):
-    _, d, one = e.at(u)
-    _put(e, e.stress(e.strain(d, one)), out)
-
-
-@kernel
-def run_linearised(e, u, du, given, out):
-    """Write the given stresses plus the linearised change by du at u."""
-    _put(e, _given(e, given) + _rate(e, u, du)[1], out)
-
-
-def _rate(e, u, du):
-    """Directions at u, and the linearised change of the stresses by du."""
+def run_linearised(e, u, du, given, out, f):
+    """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
     _, d, one = e.at(u)
     Y = e.directions(one, one)
     moduli = e.moduli if e.t.law.kind == LINEAR else e.moduli_at(e.strain(d, one))
-    return Y, e.linear_stress(e.change(Y, e.rows(e.relative(du))), moduli)
-
-
-@kernel
-def run_mean(e, u, v, f):
-    """The force whose work from u to v is the change of the energy."""
-    U, Y, middle, change = _mean(e, u, v)
-    e.add(e.force(Y, e.stress(middle, change), U), f)
-
-
-@kernel
-def run_mixed(e, u, given, out, f):
-    """The force at u of given stresses; writes those of the strain."""
-    U, d, one = e.at(u)
-    _put(e, e.stress(e.strain(d, one)), out)
-    e.add(e.force(e.directions(one, one), _given(e, given), U), f)
-
-
-@kernel
-def run_mean_mixed(e, u, v, given, out, f):
-    """The mean force from u to v of given stresses; writes the mean ones of the strain."""
-    U, Y, middle, change = _mean(e, u, v)
-    _put(e, e.stress(middle, change), out)
-    e.add(e.force(Y, _given(e, given), U), f)
-
-
-@kernel
-def run_given(e, u, given, f):
-    """The force at u of given stresses alone."""
-    one = e.at(u)[2]
-    e.add(e.force(e.directions(one, one), _given(e, given)), f)
-
-
-@kernel
-def run_viscous(e, u, v, f):
-    """The force at u of the linearised stresses of a rate v alone."""
-    e.add(e.force(*_rate(e, u, v)), f)
+    T = e.linear_stress(e.change(Y, e.rows(e.relative(du))), moduli)
+    if out.size:
+        _put(e, _given(e, given) + T, out)
+    if f.size:
+        e.add(e.force(Y, T), f)
 
 
 @kernel
@@ -133,16 +110,6 @@ def run_unsymmetric(e, u, v, flat, ld):
     flat += np.bincount(at.ravel(), K.ravel(), len(flat))
 
 
-def _shift(e, given):
-    """Stresses of linear laws, or the shift of the strain of others; the other is None. Laws with a
-    history have it in their strain, see :func:`run_put`, and no further stress."""
-    if e.t.law.kind == LINEAR:
-        return _given(e, given), None
-    if e.t.law.kind == HISTORY:
-        return np.zeros((e.ns, e.ne)), None
-    return None, given.reshape(3, -1, e.ne)
-
-
 @kernel
 def run_put(e, given):
     """Set the eigenstrains of a law with a history, minus ``given`` at the points."""
@@ -151,32 +118,28 @@ def run_put(e, given):
 
 
 @kernel
-def run_eigen_force(e, u, given, f):
-    """Change of the force at u by eigenstrains. ``given`` are stresses for a linear law, else
-    strains at the points, (3, points, ne)."""
-    _, d, one = e.at(u)
-    T, shift = _shift(e, given)
-    if T is None:
-        T = e.stress(e.strain(d, one), shift=shift)
-    e.add(e.force(e.directions(one, one), T), f)
+def run_eigen_force(e, u, v, given, f):
+    """Change of the force at u, or with v of the mean from u to v, by eigenstrains.
 
-
-@kernel
-def run_eigen_mean(e, u, v, given, f):
-    """Change of the mean force from u to v by eigenstrains."""
-    _, Y, middle, change = _mean(e, u, v)
-    T, shift = _shift(e, given)
-    e.add(e.force(Y, e.stress(middle, change, shift) if T is None else T), f)
+    ``given`` are stresses for a linear law, else strains at the points, (3, points, ne). Laws with
+    a history have it in their strain, see :func:`run_put`.
+    """
+    if e.t.law.kind == LINEAR:
+        run_force(e, u, v, given, u[:0], f)
+    elif e.t.law.kind != HISTORY:
+        _, at, dd, Y = _moved(e, u, v)
+        e.add(e.force(Y, e.stress(*_strain(e, at, dd, Y), given.reshape(3, -1, e.ne))), f)
 
 
 @kernel
 def run_eigen_tangent(e, u, given, flat, ld):
     """Change of the tangent at u by eigenstrains."""
+    if e.t.law.kind == HISTORY:
+        return
     _, d, one = e.at(u)
-    T, shift = _shift(e, given)
-    moduli = None
+    T, moduli = _given(e, given) if e.t.law.kind == LINEAR else None, None
     if T is None:
-        strain = e.strain(d, one)
+        strain, shift = e.strain(d, one), given.reshape(3, -1, e.ne)
         T, moduli = e.stress(strain, shift=shift), e.moduli_at(strain, shift)
     e.add_to_band(e.tangent(one, e.directions(one, one), T, moduli), flat, ld)
 
