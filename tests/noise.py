@@ -31,7 +31,6 @@ SEAMS = [
     ("core.band", "core.loops", "factorize", ["A.flat"], []),
     ("core.band", "core.loops", "solve", [], ["x"]),
     ("core.band", None, "solve_many", [], ["X"]),
-    (None, "core.loops", "dense_solve", [], ["b"]),  # in NumPy np.linalg.solve
     ("core.band", "core.loops", "solve_dependent", ["S"], ["b"]),
     ("core.band", "core.loops", "factorize_complex", ["A"], []),
     ("core.band", "core.loops", "solve_complex", [], ["x", "y"]),

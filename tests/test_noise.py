@@ -32,11 +32,12 @@ import numpy as np
 from numba import njit
 from skfem_ancf.core import band, jit
 jit.register()
-dense_solve = band.dense_solve
-for solve in (dense_solve, njit(lambda A, b: dense_solve(A, b))):
-    b = np.array([0.625, 3.25])
-    solve(np.diag([2.0, 4.0]), b)
-    print(*map(repr, map(float, b)))
+solve_many = band.solve_many
+A = band.Band(np.repeat([2.0, 0.0, 4.0, 0.0], [1, band.SPARE] * 2), np.arange(2), 7, 0, 0)
+for solve in (solve_many, njit(lambda A, X: solve_many(A, X))):
+    X = np.array([[0.625, 3.25]])
+    solve(A, X)
+    print(*map(repr, map(float, X[0])))
 """
 
 

@@ -15,8 +15,7 @@ from scipy import sparse
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse.linalg import splu
 
-from .callbacks import call_solver, handle_of
-from .source import F1, I1, apart, indices, primitive, shaped, source
+from .source import F1, F2, I1, apart, indices, primitive, shaped, source
 from .types import Array
 
 #: Zeros after each column of a lower half, for vectorised loops over four columns.
@@ -173,7 +172,7 @@ class BandMatrix(Band):
         if isinstance(self.factors, np.ndarray):
             return lapack.dpbtrs(self.factors, b, lower=1)[0]
         x = np.array(b.T, dtype=float, ndmin=2)
-        solve_many(self.factors, x, x)
+        solve_many(self.factors, x)
         return x.T.reshape(b.shape)
 
     @property
@@ -397,50 +396,22 @@ def _eliminate(A):
 @primitive("skfem_ancf.core.loops")
 def solve(A, x):
     """Solve in place with the factors; x is (n,)."""
-    solve_many(A, x[None], x[None])
-
-
-@primitive("skfem_ancf.core.loops")
-def dense_solve(A, b):
-    """Solve in place of the vector b; False if A is singular."""
-    try:
-        b[:] = np.linalg.solve(A, b)
-    except np.linalg.LinAlgError:
-        return False
-    return True
+    solve_many(A, x[None])
 
 
 @primitive("skfem_ancf.core.loops")
 def solve_dependent(S, b):
-    """Solve in place of b a system S (m, m) with redundant equations. S is scaled to a unit
-    diagonal and eliminated with complete pivoting down to round-off; b becomes the minimum-norm
-    solution in that scale. False if S is zero or not finite."""
-    m, size = b.size, np.abs(np.diagonal(S)).copy()
+    """Solve in place of b a system S (m, m) with redundant equations; S is work.
+
+    S is scaled to a unit diagonal; b becomes the minimum-norm solution in that scale. False if S is
+    zero or not finite.
+    """
+    size = np.sqrt(np.abs(np.diagonal(S)))
     size[size == 0.0] = 1.0
-    size = np.sqrt(size)
-    A, y, order, rank = S / (size[:, None] * size), b / size, np.arange(m), m
-    for j in range(m):
-        left = np.abs(A[j:, j:])
-        p, q = np.unravel_index(left.argmax(), left.shape)
-        pivot = left[p, q]
-        if not pivot < np.inf or j == 0 and pivot <= REPEATED:
-            return False
-        if pivot <= REPEATED:
-            rank = j
-            break
-        A[[j, j + p]], y[[j, j + p]] = A[[j + p, j]], y[[j + p, j]]
-        A[:, [j, j + q]], order[[j, j + q]] = A[:, [j + q, j]], order[[j + q, j]]
-        c = A[j + 1:, j] / A[j, j]
-        A[j + 1:, j:] -= np.outer(c, A[j, j:])
-        y[j + 1:] -= c * y[j]
-    x, free = np.zeros((m, m - rank + 1)), m - rank
-    x[:rank, free], x[:rank, :free], x[rank:, :free] = y[:rank], -A[:rank, rank:], np.eye(free)
-    x[:rank] = np.linalg.solve(np.triu(A[:rank, :rank]), x[:rank])
-    for k in range(free):  # remove the null space
-        one = x[:, k] / np.sqrt(x[:, k] @ x[:, k])
-        x[:, k + 1:] -= np.outer(one, one @ x[:, k + 1:])
-    b[order] = x[:, free]
-    b /= size
+    A = S / (size[:, None] * size)
+    if not (np.isfinite(A).all() and A.any()):
+        return False
+    b[:] = np.linalg.lstsq(A, b / size, rcond=REPEATED)[0] / size
     return True
 
 
@@ -450,20 +421,25 @@ def subtract_rows(J, x, out):
     out -= x @ J
 
 
-@primitive("skfem_ancf.core.loops")
+@apart("bands", Band, F2, F2, F1, bool, F2, F2, F1, F1, returns=int)
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
-    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``. A is factorised; J and
-    J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed if ``anew``, S (m, m)
-    is set to ``J1 Y^T``. b (m,) becomes the multipliers, x (n,) is reduced by b Y. False if S is
-    zero or not finite; redundant equations are allowed."""
+    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``.
+
+    A is factorised; J and J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed
+    if ``anew``; S (m, m) is work. b (m,) becomes the multipliers, x (n,) is reduced by b Y. 0 if
+    ``J1 Y^T`` is zero or not finite; redundant equations are allowed.
+    """
     if anew:
-        solve_many(A, J * free, Y)
-    np.dot(J1, Y.T, out=S)
-    b += J1 @ x
+        for k in range(b.size):
+            for i in indices(x.size):
+                Y[k, i] = J[k, i] * free[i]
+        solve_many(A, Y)
+    np.dot(J1, Y.T, S)
+    b += np.dot(J1, x)
     if not solve_dependent(S, b):
-        return False
-    x -= b @ Y
-    return True
+        return 0
+    subtract_rows(Y, b, x)
+    return 1
 
 
 @apart("band", Band, Band, I1, F1, F1, returns=int)
@@ -482,18 +458,17 @@ def solve_definite(A, L, fixed, b, x):
     return 1
 
 
-def solve_many(A: Band, B: Array, X: Array) -> None:
-    """X[k] = A^-1 B[k] for all k, with factors of A; B and X are (m, N)."""
-    if A.coupled.size > 0 and A.coupled[1] > 0:
-        for b, x in zip(B, X):
-            copy(b, x)
-            coupling(A, x)
+@primitive("skfem_ancf.core.loops")
+def solve_many(A, X):
+    """X[k] = A^-1 X[k] for all k, with factors of A; X is (m, N)."""
+    if isinstance(A, CoupledBand) and A.lu is not None:
+        X[:] = A.lu.solve(X.T.copy()).T
         return
     ab = as_lapack(A)
     if A.top > 0:
-        X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T
+        X[:] = lapack.dgbtrs(ab, A.width, A.width, X.T, A.pivots)[0].T
         return
-    y = lapack.dtbtrs(ab, B.T, uplo="L", diag="U")[0] / ab[0][:, None]
+    y = lapack.dtbtrs(ab, X.T, uplo="L", diag="U")[0] / ab[0][:, None]
     X[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].T
 
 
@@ -578,17 +553,17 @@ def fix(A, fixed):
     fix_stored(A.flat, A.ld, A.width, A.top, fixed)
 
 
-@primitive("skfem_ancf.core.loops")
+@apart("band", F1, int, int, int, I1)
 def fix_stored(flat, ld, width, top, fixed):
     """:func:`fix` for stored entries."""
-    n, k = flat.size // ld, np.arange(1, width + 1)
-    at, back = fixed[:, None] * ld + top, k * (ld - 1)
-    before, after = k <= fixed[:, None], k < n - fixed[:, None]
-    flat.reshape(n, ld)[fixed] = 0.0
-    flat[(at - back)[before]] = 0.0
-    if top > 0:
-        flat[(at + back)[after]] = 0.0
-    flat[at] = 1.0
+    n, step = flat.size // ld, max(1, ld - 1)
+    for i in fixed:
+        at = i * ld + top
+        flat[i * ld:(i + 1) * ld] = 0.0
+        flat[at - step * min(width, i):at:step] = 0.0
+        if top > 0:
+            flat[at + step:at + step * min(width, n - 1 - i) + 1:step] = 0.0
+        flat[at] = 1.0
 
 
 @source
@@ -613,11 +588,6 @@ def dot(a, b):
 @primitive("skfem_ancf.core.loops")
 def weighted_square(x, weights):
     return np.dot(x * x, weights)
-
-
-@primitive("skfem_ancf.core.loops")
-def total(x):
-    return np.sum(x)
 
 
 @primitive("skfem_ancf.core.loops")

@@ -4,8 +4,8 @@ of its name that :func:`skfem_ancf.core.source.primitive` marks."""
 import numpy as np
 
 from .callbacks import ask, solved
-from .band import LOST, REPEATED, SPARE, Band, coupling
-from .source import F1, F2, I1, apart, source
+from .band import LOST, REPEATED, SPARE, Band
+from .source import F1, apart, source
 
 indices = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}
 
@@ -42,8 +42,9 @@ def solve(A, x):
         solve_lower(A.flat, A.ld, A.width, x)
 
 
-def solve_joined(A, J, J1, free, anew, Y, S, b, x):
-    return join(A, J, J1, free, 1 if anew else 0, Y, S, b, x) > 0
+def solve_many(A, X):
+    for k in range(len(X)):
+        solve(A, X[k])
 
 
 # symmetric: four columns at once, since zeros after each column replace entries that it lacks.
@@ -266,125 +267,52 @@ def solve_complex(A, width, x, y):
         x[j], y[j] = (c * a + d * b) / size - p, (d * a - c * b) / size - q
 
 
-@source
-def _eliminate_column(A, b, j):
-    """Eliminate column j below the diagonal."""
-    n = b.size
-    for i in range(j + 1, n):
-        c = A[i, j] / A[j, j]
-        if c != 0.0:
-            for k in range(j, n):
-                A[i, k] -= c * A[j, k]
-            b[i] -= c * b[j]
-
-
-def dense_solve(A, b):
-    n = b.size
-    for j in range(n):
-        p = j
-        for i in range(j + 1, n):
-            if abs(A[i, j]) > abs(A[p, j]):
-                p = i
-        if not abs(A[p, j]) > 0.0:
-            return False
-        if p != j:
-            for k in range(n):
-                A[j, k], A[p, k] = A[p, k], A[j, k]
-            b[j], b[p] = b[p], b[j]
-        _eliminate_column(A, b, j)
-    for j in range(n - 1, -1, -1):
-        for k in range(j + 1, n):
-            b[j] -= A[j, k] * b[k]
-        b[j] /= A[j, j]
-    return True
-
-
 def solve_dependent(S, b):
-    m = b.size
-    rank, size, order = m, np.empty(m), np.empty(m, np.int64)
-    for j in range(m):
-        size[j], order[j] = np.sqrt(abs(S[j, j])), j
-        if size[j] == 0.0:
-            size[j] = 1.0
+    """By orthogonal rows, the largest first, with the solution of Bjorck and Paige (1992)."""
+    m = rank = b.size
+    size, first = np.empty(m), 0.0
+    for i in range(m):
+        size[i] = np.sqrt(abs(S[i, i]))
+        if size[i] == 0.0:
+            size[i] = 1.0
     for i in range(m):
         b[i] /= size[i]
-        for j in range(m):
-            S[i, j] /= size[i] * size[j]
+        for k in range(m):
+            S[i, k] /= size[i] * size[k]
     for j in range(m):
-        p, q, pivot = j, j, 0.0
+        p, most = j, 0.0
         for i in range(j, m):
-            for k in range(j, m):
-                if not abs(S[i, k]) < np.inf:
-                    return False
-                if abs(S[i, k]) > pivot:
-                    p, q, pivot = i, k, abs(S[i, k])
-        if pivot <= REPEATED:
-            if j == 0:
+            norm = np.sqrt(dot(S[i], S[i]))
+            if not norm < np.inf:
                 return False
+            if norm > most:
+                p, most = i, norm
+        if j == 0:
+            first = most
+        if most <= REPEATED * first:
             rank = j
             break
+        b[j], b[p] = b[p], b[j]
+        b[j] /= most
         for k in range(m):
             S[j, k], S[p, k] = S[p, k], S[j, k]
-        b[j], b[p] = b[p], b[j]
-        for i in range(m):
-            S[i, j], S[i, q] = S[i, q], S[i, j]
-        order[j], order[q] = order[q], order[j]
-        _eliminate_column(S, b, j)
-    free = m - rank
-    x = np.zeros((free + 1, m))
-    for k in range(free):
-        x[k, rank + k] = 1.0
-        for i in range(rank):
-            x[k, i] = -S[i, rank + k]
-    for i in range(rank):
-        x[free, i] = b[i]
-    for k in range(free + 1):
-        for i in range(rank - 1, -1, -1):
-            for j in range(i + 1, rank):
-                x[k, i] -= S[i, j] * x[k, j]
-            x[k, i] /= S[i, i]
-    for k in range(free):
-        square = 0.0
-        for i in range(m):
-            square += x[k, i] * x[k, i]
-        for l in range(k + 1, free + 1):
-            c = 0.0
-            for i in range(m):
-                c += x[k, i] * x[l, i]
-            for i in range(m):
-                x[l, i] -= c / square * x[k, i]
+            S[j, k] /= most
+        for i in range(j + 1, m):
+            c = dot(S[i], S[j])
+            b[i] -= c * b[j]
+            add_multiple(-c, S[j], S[i])
+    x = np.zeros(m)
+    for j in range(rank - 1, -1, -1):
+        add_multiple(b[j] - dot(S[j], x), S[j], x)
     for i in range(m):
-        b[order[i]] = x[free, i]
-    for i in range(m):
-        b[i] /= size[i]
-    return True
+        b[i] = x[i] / size[i]
+    return rank > 0
 
 
 def subtract_rows(J, x, out):
     for k in range(J.shape[0]):
         for i in range(out.size):
             out[i] -= J[k, i] * x[k]
-
-
-@apart("bands", Band, F2, F2, F1, int, F2, F2, F1, F1, returns=int)
-def join(A, J, J1, free, anew, Y, S, b, x):
-    if anew > 0:
-        for k in range(b.size):
-            for i in range(x.size):
-                Y[k, i] = J[k, i] * free[i]
-            solve(A, Y[k])
-    for k in range(b.size):
-        for l in range(b.size):
-            s = 0.0
-            for i in range(x.size):
-                s += J1[k, i] * Y[l, i]
-            S[k, l] = s
-        for i in range(x.size):
-            b[k] += J1[k, i] * x[i]
-    if not solve_dependent(S, b):
-        return 0
-    subtract_rows(Y, b, x)
-    return 1
 
 
 # sums
@@ -402,13 +330,6 @@ def weighted_square(x, weights):
     for i in range(x.size):
         out += weights[i] * x[i] * x[i]
     return out
-
-
-def total(x):
-    found = 0.0
-    for i in range(x.size):
-        found += x[i]
-    return found
 
 
 def smallest(x):
@@ -497,17 +418,3 @@ def log1p(x):
 
 def everywhere(condition):
     return condition
-
-
-@apart("band", F1, int, int, int, I1)
-def fix_stored(flat, ld, width, top, fixed):
-    n, step = flat.size // ld, max(1, ld - 1)
-    for i in fixed:
-        at = i * ld + top
-        flat[i * ld:(i + 1) * ld] = 0.0
-        for k in range(at - step * min(width, i), at, step):
-            flat[k] = 0.0
-        if top > 0:
-            for k in range(at + step, at + step * min(width, n - 1 - i) + 1, step):
-                flat[k] = 0.0
-        flat[at] = 1.0

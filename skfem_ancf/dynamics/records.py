@@ -9,7 +9,7 @@ import numpy as np
 from ..actions.forces.kernels import add_resisting_force, settle_contact, settle_elements
 from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import accept_body, add_viscous_force, body_tangent
-from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
+from ..core.band import Band, clear, dot, multiply, solve, solve_dependent, subtract_rows
 from ..core.callbacks import JOINTS, call_custom
 from ..core import F1, F2, F3, I1, MADE, apart, indices, source
 from ..equations.tables import Equations
@@ -109,7 +109,7 @@ def _correct_rows(rows, x):
     for a in range(k):
         for c in range(k):
             z[a] += rows.S[a, c] * y[c]
-    dense_solve(H, z)
+    solve_dependent(H, z)
     subtract_rows(rows.Z, z, x)
 
 

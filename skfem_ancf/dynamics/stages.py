@@ -222,7 +222,7 @@ def _close(e, matrices, s, w, motion, t, step):
 def _meet(mass, free, w, x, anew):
     """Project x onto J x = -``w.shares``, which become multipliers; J M^-1 is new if ``anew``."""
     J = w.end[0]
-    return solve_joined(mass, J, J, free, anew, w.end[1], w.shared, w.shares, x)
+    return solve_joined(mass, J, J, free, anew, w.end[1], w.shared, w.shares, x) > 0
 
 
 @source

@@ -19,7 +19,7 @@ from ..actions.contact.tables import PRESSURES
 from ..actions.forces.kernels import augment_contact, set_contact_rate
 from ..actions.tables import MATERIALS, add_constraint_rate, carry_eigenstrains, constraint
 from ..beam.strain_energy import body_linearised, body_stress, quadratic
-from ..core.band import clear, copy, dot, solve_joined, subtract_rows, total
+from ..core.band import clear, copy, dot, solve_joined, subtract_rows
 from ..core.callbacks import call_solver
 from ..core import F1, apart, indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, LASTING, MIXED, NOT_CONVERGED,
@@ -48,8 +48,8 @@ def end_velocity(e, matrices, rule, s, w, state, exact):
     drive_rate(e.joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
     if rule.mass_solver > 0:
         return _eliminated(e.joints, rule, s, w, w.x.middle, w.m.impulse, w.x.v, state, exact)
-    if not solve_joined(matrices.mass, w.J[0], w.J[1], e.free, not s.kept, w.J[3], w.S, w.m.impulse,
-                        w.x.v):
+    if solve_joined(matrices.mass, w.J[0], w.J[1], e.free, not s.kept, w.J[3], w.S, w.m.impulse,
+                    w.x.v) == 0:
         state.failure[0] = DEPENDENT
         return FAILED
     return GO_ON
@@ -110,7 +110,7 @@ def close_acceleration(e, matrices, rule, s, w, state):
         for i in indices(w1.size):
             w1[i] += share * w.x.damping_velocity[i]
     else:
-        if not solve_joined(matrices.mass, w.J[1], w.J[1], e.free, anew, w.J[3], w.S, dl, a1):
+        if solve_joined(matrices.mass, w.J[1], w.J[1], e.free, anew, w.J[3], w.S, dl, a1) == 0:
             state.failure[0] = DEPENDENT
             return FAILED
         for k in indices(l.size):
@@ -328,7 +328,7 @@ def _correct(e, matrices, rule, s, w, state, anew):
         if rule.solver > 0:
             good = call_solver(rule.solver, s.t, u, l, R, phi, du, dl)
         else:
-            good = solve_joined(A, w.J[0], w.J[1], e.free, anew, w.J[2], w.S, dl, du)
+            good = solve_joined(A, w.J[0], w.J[1], e.free, anew, w.J[2], w.S, dl, du) > 0
         if not good:
             state.failure[0] = DEPENDENT
             return FAILED
@@ -338,7 +338,7 @@ def _correct(e, matrices, rule, s, w, state, anew):
         for k in indices(l.size):
             l[k] += dl[k]
             phi[k] = np.abs(phi[k] * dl[k])
-        work += total(phi)
+        work += np.sum(phi)
     for i in indices(u.size):
         u[i] += du[i]
     state.last_correction[0], state.correction[0] = state.correction[0], np.sqrt(work)
