@@ -143,7 +143,6 @@ def test_loops_are_arrays(kind, mesh):
         if not linear:
             eigen = 1e-3 * np.cos(np.arange(3.0 * t.weights.shape[1] * len(t.start)))
         f, g, A, B, S, T = (np.zeros(n) for n in (k.N, k.N, k.N * ld, k.N * ld, ns, ns))
-        D, E = np.zeros((2, 4 * ns * k.nd))
         for one, *both in (
                 ((runs.run_force, u, none, none, none), (f, g)),
                 ((runs.run_force, u, none, none), (S, T)),
@@ -155,7 +154,6 @@ def test_loops_are_arrays(kind, mesh):
                 ((runs.run_linearised, u, v, none, none), (f, g)),
                 *(((runs.run_tangent, u, x), (S, T), (f, g), (A, B)) for x in (none, given)),
                 ((runs.run_unsymmetric, u, v), (A, B)),
-                ((runs.run_gradients, u), (D, E)),
                 ((runs.run_eigen_force, u, none, eigen), (f, g)),
                 ((runs.run_eigen_force, u, v, eigen), (f, g)),
                 ((runs.run_eigen_tangent, u, eigen), (A, B))):

@@ -5,20 +5,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.band import add_multiple, clear, copy
-from ..core import I1, I2, cached_property, primitive, shaped, source
+from ..core.band import add_multiple, clear
+from ..core.immutable import cached_property
+from ..core.source import I1, I2, primitive, source
 from .beam import Beam
 from .kernels.elements import Elements
 from .kernels.histories import Past, elements_of, remembering
 from .kernels.law import LINEAR
-from .kernels.runs import (add_changes, add_transposed, run_accept, run_eigen_force,
-                           run_eigen_tangent, run_force, run_gradients, run_linearised, run_put,
-                           run_tangent, run_unsymmetric)
+from .kernels.runs import (run_accept, run_eigen_force, run_eigen_tangent, run_force,
+                           run_linearised, run_put, run_tangent, run_unsymmetric)
 from .kernels.tables import CABLE, StrainTables, repeated, together
 
-#: Columns of the table of a body: begin and end of stresses; samples and DOFs of an element; begin
-#: and end of gradients; kind.
-BEGIN, END, SAMPLES, SPAN, BEGIN_GRADIENTS, END_GRADIENTS, KIND = range(7)
+#: Columns of the table of a body: begin and end of stresses; kind.
+BEGIN, END, KIND = range(3)
 
 
 class Body:
@@ -84,13 +83,12 @@ def eigenstrain_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Bod
 
 
 def _body(tables, numbers, kernel=None):
-    rows, at, place = [], 0, 0
+    rows, at = [], 0
     flat = tuple(t for its in tables for t in its)
     for t in flat:
-        size, span = numbers(t) * len(t.start), 2 * t.G.shape[2] + 2
-        n = 2 * t.rows.shape[1] * len(t.start) * span
-        rows.append([at, at + size, t.rows.shape[1], span, place, place + n, t.kind])
-        at, place = at + size, place + n
+        size = numbers(t) * len(t.start)
+        rows.append([at, at + size, t.kind])
+        at += size
     return Body(flat, np.array(rows, np.int64).reshape(-1, KIND + 1), kernel)
 
 
@@ -121,11 +119,6 @@ def stress_size(body: Body) -> int:
     return int(body.table[-1, END]) if len(body.table) else 0
 
 
-def gradients_size(body: Body) -> int:
-    """Number of results of :func:`body_gradients`."""
-    return int(body.table[-1, END_GRADIENTS]) if len(body.table) else 0
-
-
 @source
 def quadratic(body):
     """True if all strains are quadratic in the DOFs, which holds for sections."""
@@ -139,12 +132,6 @@ def quadratic(body):
 def _stress(body, k, stresses):
     """View of the stresses of table k."""
     return stresses[body.table[k, BEGIN]:body.table[k, END]] if stresses.size > 0 else stresses
-
-
-@source
-def _gradients(body, k, gradients):
-    """View of the gradients of table k."""
-    return gradients[body.table[k, BEGIN_GRADIENTS]:body.table[k, END_GRADIENTS]]
 
 
 @source
@@ -238,49 +225,6 @@ def accept_body(body, u0, u1, out):
     """Set the histories after an increment from u0 to u1; add what it dissipates to ``out[0]``."""
     for k in range(body.table.shape[0]):
         run_accept(tables_of(body, k), u0, u1, out)
-
-
-@source
-def body_gradients(body, u, gradients):
-    """Derivatives of the strains and the weighted stresses at u for each element."""
-    for k in range(body.table.shape[0]):
-        run_gradients(tables_of(body, k), u, _gradients(body, k, gradients))
-
-
-@source
-def body_tangent_by(body, u, stresses, gradients, A):
-    """As :func:`body_gradients`, with the lower half of the tangent for given stresses."""
-    clear(A.flat)
-    body_gradients(body, u, gradients)
-    none = u[:0]
-    for k in range(body.table.shape[0]):
-        run_tangent(tables_of(body, k), u, _stress(body, k, stresses), none, none, A.flat[A.top:],
-                    A.ld)
-
-
-@source
-def _halves(body, k, gradients):
-    """The gradients of table k, (2, elements, samples, DOFs)."""
-    row, found = body.table[k], _gradients(body, k, gradients)
-    n = row[SAMPLES] * row[SPAN]
-    return shaped(found, (np.int64(2), found.size // (2 * n), row[SAMPLES], row[SPAN]))
-
-
-@source
-def linearised_by(body, copies, gradients, du, stresses, independent):
-    """Linearised stresses of copies, by the gradients of the body."""
-    copy(stresses, independent)
-    for k in range(body.table.shape[0]):
-        add_changes(_halves(body, k, gradients)[1], tables_of(copies, k).start, du,
-                    _stress(copies, k, independent))
-
-
-@source
-def add_force_by(body, copies, gradients, stresses, f):
-    """As :func:`add_force_of` for copies, by the gradients of the body."""
-    for k in range(body.table.shape[0]):
-        add_transposed(_halves(body, k, gradients)[0], tables_of(copies, k).start,
-                   _stress(copies, k, stresses), f)
 
 
 @source

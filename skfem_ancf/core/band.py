@@ -435,7 +435,8 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
                 Y[k, i] = J[k, i] * free[i]
         solve_many(A, Y)
     np.dot(J1, Y.T, S)
-    b += np.dot(J1, x)
+    for k in range(b.size):
+        b[k] += dot(J1[k], x)
     if not solve_dependent(S, b):
         return 0
     subtract_rows(Y, b, x)

@@ -12,8 +12,7 @@ import numpy as np
 
 from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.tables import constraint, joint_directions
-from ..beam.strain_energy import gradients_size
-from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
+from ..core.band import BandMatrix, CoupledBand, factorize, fix, solve
 from ..core.callbacks import handle_of
 from ..core import I1, Array, ConvergenceError, SupportError, refuse, require_positive
 from ..core.words import hints
@@ -501,8 +500,7 @@ class StageIntegrator(Integrator):
     def _work(self):
         s, tables = self.system, self.system.backend.tables
         return new_points(self.scheme.table.method, s.N, self.m, len(self._matrices.rows.P),
-                          tables.stresses.size, gradients_size(tables.plain.body),
-                          s.mass._replace(flat=np.zeros(s.mass.flat.size)))
+                          tables.stresses.size, s.mass._replace(flat=np.zeros(s.mass.flat.size)))
 
     def _begin(self, y, dt, n, given):
         s, w, table, memory = self.system, self._work, self.scheme.table, y.memory or {}

@@ -7,7 +7,7 @@ import numpy as np
 from ..actions.forces.kernels import (add_element_damping, add_element_tangent, element_damping,
                                       element_stiffness, put_between)
 from ..actions.tables import add_load_stiffness, joint_directions
-from ..beam.strain_energy import body_mean_stress, body_stress, body_tangent, body_tangent_by
+from ..beam.strain_energy import body_mean_stress, body_stress, body_tangent
 from ..core.band import (SPARE, Band, add_multiple, copy, factorize, factorize_complex, fix_stored,
                          solve, solve_complex, solve_dependent)
 from ..core import F1, F2, F3, indices, shaped, source
@@ -65,8 +65,7 @@ class StageWork(NamedTuple):
     r: F1  # work, (2 b,)
     q: F2  # work, (2 b, 2 b)
     Q: F3  # Schur complement of the rows for each eigenvalue, (k, 2 b, 2 b)
-    origin: F1  # displacement of the factorised matrix, (N,)
-    B: F1  # strain gradients there
+    origins: F2  # displacement of the factorised matrix in each row, (n, N)
     pairs: F2  # factors of complex eigenvalues, real and imaginary parts, (k, 2 N ld)
     real: Band  # factor of the real eigenvalue
     J: F2  # low-rank rows at the origin, joints first, (b, N)
@@ -79,15 +78,14 @@ class StageWork(NamedTuple):
     method: Method
 
 
-def new_points(method: Method, N: int, m: int, rows: int, stresses: int, gradients: int,
-                    D: Band) -> StageWork:
+def new_points(method: Method, N: int, m: int, rows: int, stresses: int, D: Band) -> StageWork:
     """The StageWork of a method, with zeros."""
     n, k, ld, b = method.points.size, method.values.shape[1], D.width + 1 + SPARE, m + rows
     real = Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0)
     return StageWork._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
         *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * b),
-        np.zeros((2 * b, 2 * b)), np.zeros((k, 2 * b, 2 * b)), np.zeros(N), np.zeros(gradients),
+        np.zeros((2 * b, 2 * b)), np.zeros((k, 2 * b, 2 * b)), np.zeros((n, N)),
         np.zeros((k, 2 * N * ld)), real, np.zeros((b, N)), np.zeros((2 * k, b, N)),
         np.zeros((2, rows, rows)), np.zeros((2, m, N)), np.zeros((m, m)), np.zeros(m), D, method])
 
@@ -101,18 +99,19 @@ def flat_points(x):
 @source
 def factorize_stages(e, matrices, method, s, w, state, step):
     """Factorise the iteration matrices at the mean of the points; False on failure."""
-    origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
+    origin, f, S, yes = w.origins[0], w.x[0], w.stresses, w.x.size > 0
     at, e.span[0] = step * (method.points.size + 1), s.h
     for i in indices(origin.size):
         origin[i] = 0.0
     for k in range(method.points.size):
         add_multiple(method.weights[k], w.U[k], origin)
+    for k in range(1, method.points.size):
+        copy(origin, w.origins[k])
     if state.mixed_steps[0] > 0:
         body_mean_stress(e.body, e.copies, method.weights, w.independent, S[1])
-        body_tangent_by(e.body, origin, S[1], w.B, e.K)
     else:
         body_stress(e.body, w.y[0], S[1])
-        body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
+    body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
     add_load_stiffness(e.loads, row_of(s.factors, at), s.times[at], 1.0, origin, e.K)
     add_element_tangent(e.forces, s.times[at], origin, e.K)
     D = w.D.flat
@@ -171,7 +170,7 @@ def _rows(e, matrices, s, w, at):
     """Set the low-rank rows at the mean of the points, and the coupling of those of no joint."""
     m, forces, t = w.l.shape[1], e.forces, s.times[at]
     if m > 0:
-        joint_directions(e.joints, row_of(s.joints.g, at)[0], t, w.origin, w.J[:m])
+        joint_directions(e.joints, row_of(s.joints.g, at)[0], t, w.origins[0], w.J[:m])
     for a in range(matrices.rows.P.shape[0]):
         copy(matrices.rows.P[a], w.J[m + a])
     for a in range(w.J.shape[0]):
@@ -180,9 +179,9 @@ def _rows(e, matrices, s, w, at):
             J[i] *= e.free[i]
     modes, D = matrices.dampers.modes.shape[0], np.empty(forces.size)
     if w.S.shape[1] > modes:
-        element_stiffness(forces, t, w.origin, w.y[1], 0.0, D)
+        element_stiffness(forces, t, w.origins[0], w.y[1], 0.0, D)
         put_between(forces, D, 1.0, modes, w.S[0])
-        element_damping(forces, t, w.origin, w.y[1], D)
+        element_damping(forces, t, w.origins[0], w.y[1], D)
         put_between(forces, D, 1.0, modes, w.S[1])
     for a in range(modes):
         w.S[1, a, a] = 1.0

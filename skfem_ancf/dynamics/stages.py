@@ -7,8 +7,8 @@ step."""
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy, multiply, solve, solve_joined
-from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force,
-                                  body_gradients, body_mixed, body_stress, linearised_by)
+from ..beam.strain_energy import (add_force_of, add_viscous_stress, body_force, body_linearised,
+                                  body_mixed, body_stress)
 from ..actions.forces.kernels import add_elastic_force, set_contact_rate
 from ..core import indices, source
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, carry_eigenstrains,
@@ -105,13 +105,13 @@ def _converges(e, matrices, method, rule, s, w, state, step):
                 and state.correction[0] > reference)
         if status == GO_ON and state.fresh[0] > 0 and e.lasting < MATERIALS and lost:
             state.mixed_steps[0], status = LASTING, RESTART  # with the same factors
-            body_gradients(e.body, w.origin, w.B)
         if status == RESTART:
             _start(e, matrices, method, s, w, state, step)
         elif status != GO_ON:
             break
         elif state.mixed_steps[0] > 0:
-            linearised_by(e.body, e.copies, w.B, flat_points(w.R), w.constitutive, w.independent)
+            body_linearised(e.copies, flat_points(w.origins), flat_points(w.R), w.constitutive,
+                            w.independent)
             if matrices.dampers.viscous > 0:
                 _add_rates(e, method, s.h, w)
     _states(e.free, method, s, w, step, True)
@@ -285,7 +285,7 @@ def _internal(e, matrices, method, s, w, state, step):
                                    constitutive)
         for i in indices(missing.size):
             missing[i] = constitutive[i] - independent[i]
-        add_force_by(e.body, e.copies, w.B, missing, f)
+        add_force_of(e.copies, flat_points(w.origins), missing, f)
     elif e.lasting >= MATERIALS:
         for k in range(w.U.shape[0]):
             e.span[0] = s.h * method.points[k]
@@ -303,7 +303,7 @@ def _add_rates(e, method, h, w):
         clear(dv)
         for j in range(w.R.shape[0]):
             add_multiple(method.first[k, j] / h, w.R[j], dv)
-        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origin, dv, w.stresses, w.independent)
+        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origins[0], dv, w.stresses, w.independent)
 
 
 @source

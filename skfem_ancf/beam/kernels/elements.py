@@ -25,6 +25,8 @@ from .tables import CABLE, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables
 
 #: Mode of ``take`` for valid numbers, which is the fastest.
 CLIP: Any = "clip"
+#: Number of displacements whose rows are kept.
+KEPT = 3
 #: Relative difference between shared and own derivatives that is round-off.
 SAME = 1e-13
 
@@ -96,6 +98,7 @@ class Elements:
         self.x = self._last(t.frame, OF_FRAME)
         self.start, self.rest = t.start, self.measured(self.x)
         self._second, self._sample, self._row, self._direction = t.pattern.ends
+        self._last_rows: tuple[Any, ...] = ()  # displacements as bytes, with the results of :meth:`at`
         # relative DOFs (2 m, ne)
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]
@@ -146,11 +149,18 @@ class Elements:
         a, b = z[::2], z[1::2]
         return a, b, np.abs(a), (b / a).imag
 
-    def at(self, u: Array) -> tuple[Array, Array, Any]:
-        """Relative DOFs, changes of the rows and measures at u."""
+    def at(self, u: Array) -> tuple[Array, Array, Any, Array]:
+        """Relative DOFs, changes of the rows, measures and directions at u."""
+        key = u.tobytes()  # iterations of steps come back to their start and to that of the factors
+        for known, found in self._last_rows:
+            if known == key:
+                return found
         U = self.relative(u)
         d = self.rows(U)
-        return U, d, self.measured(self.x + d)
+        one = self.measured(self.x + d)
+        found = U, d, one, self.directions(one, one)
+        self._last_rows = ((key, found), *self._last_rows[:KEPT - 1])
+        return found
 
     def directions(self, one: Any, two: Any) -> Array:
         """Directions (n, 2, ne) whose products with a change of the rows are that of the strain.

@@ -152,7 +152,7 @@ class ElementsWithHistory(Elements):
 
     def strain_at(self, u: Array) -> Array:
         """Strain at the integration points, (c, points, ne)."""
-        _, d, one = self.at(u)
+        _, d, one, _ = self.at(u)
         return self.at_points(self.strain(d, one))
 
     def accept(self, u: Array, v: Array) -> float:

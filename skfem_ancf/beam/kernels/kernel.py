@@ -157,8 +157,7 @@ class ElementKernel:
         u, v = (self.gather(self._checked(x)).ravel() for x in (u, v))
         out = np.zeros_like(u)
         for e in self._apart:
-            one = e.at(u)[2]
-            Y = e.directions(one, one)
+            Y = e.at(u)[3]
             e.add(e.force(Y, time * e.linear_stress(e.change(Y, e.rows(e.relative(v))))), out)
         return out.reshape(self.t.shape[1], -1, 2)
 
@@ -232,9 +231,8 @@ def _run_tangent(e, u, given, flat, ld):
 
 
 def _run_geometric(e, u, given, flat, ld):
-    one = e.at(u)[2]
-    e.add_to_band(e.tangent(one, e.directions(one, one), given.reshape(e.ne, e.ns).T, None), flat,
-                  ld)
+    _, _, one, Y = e.at(u)
+    e.add_to_band(e.tangent(one, Y, given.reshape(e.ne, e.ns).T, None), flat, ld)
 
 
 def _square_root(K):
@@ -248,11 +246,11 @@ def _square_root(K):
 
 def strains(e: Elements, u: Array) -> Array:
     """Strains of the samples, (ns, ne), linearised for a complex u."""
-    _, d, one = e.at(u.real)
+    _, d, one, Y = e.at(u.real)
     strain = e.strain(d, one)
     if not np.iscomplexobj(u):
         return strain
-    return strain + 1j * e.change(e.directions(one, one), e.rows(e.relative(u.imag)))
+    return strain + 1j * e.change(Y, e.rows(e.relative(u.imag)))
 
 
 def energies_of(e: Elements, u: Array) -> Array:

@@ -164,72 +164,6 @@ def add_unsymmetric(start, first, ld, m, K, Z, A):
                 A[(start[first + e] + j) * ld + i - j] += si * sj * x
 
 
-# gradients of strains
-
-
-@apart("gradients", CompiledTables, F1, F1)
-def run_gradients(t, u, out):
-    R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
-    both = out.reshape(2, len(t.start), ns, 2 * m + 2)
-    U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
-    E, Y = np.empty((ns, t.width)), np.empty((3 * R // 2, 2 * t.width))
-    B, C = np.empty((ns, 2 * m * t.width)), np.empty((ns, 2 * m * t.width))
-    for first in range(0, len(t.start), W):
-        displaced(t, first, u, U, d, r)
-        strains(t, first, d, r, E)
-        put_derivatives(t, first, directions(t, r, d[:0], Y), B)
-        H, pairs = moduli(t, first, E), t.pattern.pairs
-        C[:] = 0.0
-        for q in range(len(H)):
-            s, p, h = pairs[0, q], pairs[1, q], H[q]
-            for i in range(2 * m):
-                for e in range(t.width):
-                    C[s, i * W + e] += h[e] * B[p, i * W + e]
-                if s != p:
-                    for e in range(t.width):
-                        C[p, i * W + e] += h[e] * B[s, i * W + e]
-        put_columns(t, first, B, 1, both[0])
-        put_columns(t, first, C, -1, both[1])
-
-
-@source
-def put_derivatives(t, first, X, B):
-    """Derivatives of the strains by the scaled unknowns, (ns, 2 m W)."""
-    rows, ways, m, shared = t.pattern.rows, t.pattern.ways, t.G.shape[1], len(t.own) == 0
-    G = np.empty((t.G.size, t.width))
-    for n in range(len(G)):
-        for e in range(t.width):
-            G[n, e] = t.G[n // m, n % m] if shared else t.own[first // W, n, e]
-    B[:] = 0.0
-    for s in range(len(B)):
-        for i in range(2):
-            if ways[i, s] >= 0:
-                x = X[ways[i, s]]
-                for k in range(m):
-                    g = G[rows[i, s] * m + k]
-                    for j in range(0, 2 * W, W):
-                        for e in range(t.width):
-                            B[s, 2 * k * W + j + e] += g[e] * x[j + e]
-
-
-@source
-def put_columns(t, first, B, power, out):
-    """Write derivatives by the DOFs of both nodes."""
-    ns, m = len(B), B.shape[1] // (2 * W)
-    for e in range(min(W, len(t.start) - first)):
-        for s in range(ns):
-            c = 1.0
-            if len(t.sigma) > 0:
-                c = block(t.sigma, first)[s, e] ** power
-            for i in range(2 * m):
-                x = c * B[s, i * W + e]
-                if len(t.D) > 0:
-                    x *= block(t.D, first)[i // 2, e]
-                out[first + e, s, i + 2] = x
-            for i in range(2):
-                out[first + e, s, i] = -out[first + e, s, 2 * (m // 2) + 2 + i]
-
-
 # eigenstrains
 
 
@@ -315,27 +249,3 @@ def run_accept(t, u, v, out):
 
 def run_put(t, given):
     pass  # as well
-
-
-# derivatives of strains in collocation
-
-
-@source
-def add_changes(B, start, x, T):
-    k, ns, n = B.shape
-    for e in range(len(start)):
-        for s in range(ns):
-            total = 0.0
-            for i in range(n):
-                total += B[e % k, s, i] * x[start[e] + i]
-            T[e * ns + s] += total
-
-
-@source
-def add_transposed(B, start, T, f):
-    k, ns, n = B.shape
-    for e in range(len(start)):
-        for s in range(ns):
-            total = T[e * ns + s]
-            for i in range(n):
-                f[start[e] + i] += B[e % k, s, i] * total

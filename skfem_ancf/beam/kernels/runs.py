@@ -28,9 +28,9 @@ def _moved(e, u, v):
 
     With v, DOFs and directions are means from u to v; without it, the second change is None.
     """
-    U, d, one = e.at(u)
+    U, d, one, Y = e.at(u)
     if not v.size:
-        return U, (d, one), None, e.directions(one, one)
+        return U, (d, one), None, Y
     dU = e.relative(v - u)
     dd = e.rows(dU)
     return U + 0.5 * dU, (d, one), dd, e.directions(one, e.measured(e.x + d + dd))
@@ -62,8 +62,7 @@ def run_force(e, u, v, given, out, f):
 @kernel
 def run_linearised(e, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
-    _, d, one = e.at(u)
-    Y = e.directions(one, one)
+    _, d, one, Y = e.at(u)
     moduli = e.moduli if e.t.law.kind == LINEAR else e.moduli_at(e.strain(d, one))
     T = e.linear_stress(e.change(Y, e.rows(e.relative(du))), moduli)
     if out.size:
@@ -74,11 +73,12 @@ def run_linearised(e, u, du, given, out, f):
 
 @kernel
 def run_tangent(e, u, given, out, f, flat, ld):
-    """Tangent and force at u; writes the stresses. The geometric part has the given stresses, or
-    those of the strain if there are none."""
-    U, d, one = e.at(u)
-    Y, strain = e.directions(one, one), e.strain(d, one)
-    T, moduli = e.stress_and_moduli(strain)
+    """Tangent and force at u; writes the stresses.
+
+    The geometric part has the given stresses, or those of the strain if there are none.
+    """
+    U, d, one, Y = e.at(u)
+    T, moduli = e.stress_and_moduli(e.strain(d, one))
     if f.size:
         e.add(e.force(Y, T, U), f)
     if out.size:
@@ -89,21 +89,19 @@ def run_tangent(e, u, given, out, f, flat, ld):
     e.add_to_band(K, flat, ld)
 
 
-@kernel
 def run_gradients(e, u, out):
     """Write derivatives of the strains and of the weighted stresses, (2, ne, ns, 2 nb)."""
-    _, d, one = e.at(u)
+    _, d, one, Y = e.at(u)
     both = out.reshape(2, e.ne, e.ns, -1)
-    both[0] = e.derivatives(e.directions(one, one))
+    both[0] = e.derivatives(Y)
     np.matmul(e.square(e.moduli_at(e.strain(d, one))), both[0], out=both[1])
 
 
 @kernel
 def run_unsymmetric(e, u, v, flat, ld):
     """Add ``B(u)^T D (B(v) - B(u))`` to a matrix, entry (i, j) at ``flat[j * ld + i - j]``."""
-    _, d, one = e.at(u)
-    two = e.at(v)[2]
-    B, change = e.derivatives(e.directions(one, one)), e.derivatives(e.directions(two, two))
+    _, d, one, Y = e.at(u)
+    B, change = e.derivatives(Y), e.derivatives(e.at(v)[3])
     K = B.transpose(0, 2, 1) @ (e.square(e.moduli_at(e.strain(d, one))) @ (change - B))
     j = np.arange(K.shape[1])
     at = (e.t.start[:, None, None] + j) * ld + j[:, None] - j
@@ -136,12 +134,12 @@ def run_eigen_tangent(e, u, given, flat, ld):
     """Change of the tangent at u by eigenstrains."""
     if e.t.law.kind == HISTORY:
         return
-    _, d, one = e.at(u)
+    _, d, one, Y = e.at(u)
     T, moduli = _given(e, given) if e.t.law.kind == LINEAR else None, None
     if T is None:
         strain, shift = e.strain(d, one), given.reshape(3, -1, e.ne)
         T, moduli = e.stress(strain, shift=shift), e.moduli_at(strain, shift)
-    e.add_to_band(e.tangent(one, e.directions(one, one), T, moduli), flat, ld)
+    e.add_to_band(e.tangent(one, Y, T, moduli), flat, ld)
 
 
 @kernel
@@ -149,17 +147,3 @@ def run_accept(e, u, v, out):
     """Set the history after an increment from u to v; add what it dissipates to ``out[0]``."""
     if e.t.law.kind == HISTORY:
         out[0] += e.accept(u, v)
-
-
-@kernel
-def add_changes(B, start, x, T):
-    """Add ``B[e] x`` at start[e] to T (ne ns,), with B repeated for copies of the elements."""
-    x = x[start[:, None] + np.arange(B.shape[2])].reshape(-1, len(B), B.shape[2], 1)
-    T += (B @ x).ravel()
-
-
-@kernel
-def add_transposed(B, start, T, f):
-    """Add ``B[e]^T T[e]`` at start[e] to f, with B repeated for copies."""
-    F = T.reshape(-1, len(B), 1, B.shape[1]) @ B
-    np.add.at(f, start[:, None] + np.arange(B.shape[2]), F.reshape(len(start), -1))
