@@ -21,10 +21,12 @@ def block(x, first):
 
 @apart("StrainTables", CompiledTables, int, F1, F2)
 def gather(t, first, u, U):
-    """DOFs relative to the left node, scaled."""
-    m, start = len(U), t.start
-    for e in range(t.width):
-        v = u[start[min(first + e, len(start) - 1)]:]
+    """DOFs relative to the left node, scaled; those of no element are zero."""
+    m, start, last = len(U), t.start, min(t.width, len(t.start) - first)
+    if last < t.width:
+        U[:] = 0.0
+    for e in range(last):
+        v = u[start[first + e]:]
         for k in range(m):
             U[k, e], U[k, W + e] = v[2 * k + 2], v[2 * k + 3]
         U[m // 2, e] -= v[0]
@@ -293,9 +295,11 @@ def between_samples(t, first, M, H):
 @apart("StrainTables", CompiledTables, int, F1, F2)
 def take(t, first, given, T):
     """Given stresses, scaled."""
-    ns, ne = len(T), len(t.start)
-    for e in range(t.width):
-        one = given[min(first + e, ne - 1) * ns:]
+    ns, last = len(T), min(t.width, len(t.start) - first)
+    if last < t.width:
+        T[:] = 0.0
+    for e in range(last):
+        one = given[(first + e) * ns:]
         for s in range(ns):
             T[s, e] = one[s]
     if len(t.sigma) > 0:

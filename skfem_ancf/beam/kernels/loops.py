@@ -18,9 +18,11 @@ from .law import LINEAR, conserve, law_evaluate
 def run_force(t, u, v, given, out, f):
     """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
     Given stresses act in place of those of the strain; without ``out``, they act without the
-    constant stiffness."""
-    R, m, ns, du, moving = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v.copy(), v.size > 0
+    constant stiffness.
+    """
+    R, m, ns, du, moving = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v, v.size > 0
     if moving:
+        du = v.copy()
         add_multiple(-1.0, u, du)
     work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
     U, V, F, rows = work[:m], work[m:2 * m], work[2 * m:3 * m], work[3 * m:]
