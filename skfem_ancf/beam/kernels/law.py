@@ -9,7 +9,7 @@ import numpy as np
 from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
 from ...materials.history import AtRest
-from ...core import F1, F2, indices, primitive, source
+from ...core.source import F1, F2, F3, apart, indices, primitive
 
 #: Kinds of laws: constant moduli, a function of the strain at a point, a law in Python, one with a
 #: history.
@@ -57,7 +57,7 @@ def material_of(law: LawTables) -> Any:
     return _LAWS[law.handle]
 
 
-@source
+@apart("laws", LawTables, F3, F3)
 def law_evaluate(law, strain, out):
     """Second Piola-Kirchhoff stress, moduli or energy per volume of a nonlinear law. ``strain`` is
     (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements). The shape of ``out`` selects the result: (3,
@@ -86,7 +86,7 @@ def law_evaluate(law, strain, out):
                 out[k, p, e] *= y
 
 
-@source
+@apart("laws", LawTables, F3, F3, F3)
 def conserve(law, middle, change, S):
     """Correct the mean stress S so that its work equals the change of energy, by Gonzalez (2000).
     ``middle`` and ``change`` are the mean of both strains and their difference, (3, n,
