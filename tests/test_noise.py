@@ -32,12 +32,12 @@ import numpy as np
 from numba import njit
 from skfem_ancf.core import band, jit
 jit.register()
-solve_many = band.solve_many
-A = band.Band(np.repeat([2.0, 0.0, 4.0, 0.0], [1, band.SPARE] * 2), np.arange(2), 7, 0, 0)
-for solve in (solve_many, njit(lambda A, X: solve_many(A, X))):
-    X = np.array([[0.625, 3.25]])
-    solve(A, X)
-    print(*map(repr, map(float, X[0])))
+solve_complex = band.solve_complex
+A = np.repeat([2.0, 0.0, 4.0, 0.0], [1, band.SPARE, 1, 3 * band.SPARE + 2])
+for solve in (solve_complex, njit(lambda A, width, x, y: solve_complex(A, width, x, y))):
+    x = np.array([0.625, 3.25])
+    solve(A, 0, x, np.zeros(2))
+    print(*map(repr, map(float, x)))
 """
 
 
