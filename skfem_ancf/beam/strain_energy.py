@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.band import add_multiple, clear
-from ..core.immutable import cached_property
-from ..core.source import I1, I2, primitive, source
+from ..core import I1, I2, cached_property, primitive, source
 from .beam import Beam
 from .kernels.elements import Elements
 from .kernels.histories import Past, elements_of, remembering
@@ -161,7 +160,6 @@ def body_tangent(body, u, f, independent, use_independent, stresses, A):
 
 @source
 def body_stress(body, u, stresses):
-    """The stresses at u."""
     _add_force(body, u, u[:0], u[:0], stresses, u[:0])
 
 
@@ -216,7 +214,6 @@ def body_mixed(body, mean, u0, u1, f, independent, stresses):
 
 @source
 def add_force_of(body, u, stresses, f):
-    """Add the force at u of given stresses."""
     _add_force(body, u, u[:0], stresses, u[:0], f)
 
 
@@ -243,10 +240,8 @@ def put_eigenstrains(body, given):
 
 @source
 def add_eigen_force(body, u, v, given, f):
-    """Add the change of the force at u by eigenstrains, see :func:`eigenstrain_body_of`.
-
-    With v, it is that of the mean force from u to v.
-    """
+    """Add the change of the force at u, or with v of the mean from u to v, by eigenstrains, see
+    :func:`eigenstrain_body_of`."""
     for k in range(body.table.shape[0]):
         run_eigen_force(tables_of(body, k), u, v, _stress(body, k, given), f)
 

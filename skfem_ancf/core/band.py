@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse.linalg import splu
 
+from .callbacks import call_solver, handle_of
 from .source import F1, F2, I1, apart, indices, primitive, shaped, source
 from .types import Array
 
@@ -401,11 +402,9 @@ def solve(A, x):
 
 @primitive("skfem_ancf.core.loops")
 def solve_dependent(S, b):
-    """Solve in place of b a system S (m, m) with redundant equations; S is work.
-
-    S is scaled to a unit diagonal; b becomes the minimum-norm solution in that scale. False if S is
-    zero or not finite.
-    """
+    """Solve in place of b a system S (m, m), which is work, with redundant equations. S is scaled to
+    a unit diagonal; b becomes the minimum-norm solution in that scale. False if S is zero or not
+    finite."""
     size = np.sqrt(np.abs(np.diagonal(S)))
     size[size == 0.0] = 1.0
     A = S / (size[:, None] * size)
@@ -423,12 +422,10 @@ def subtract_rows(J, x, out):
 
 @apart("bands", Band, F2, F2, F1, bool, F2, F2, F1, F1, returns=int)
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
-    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``.
-
-    A is factorised; J and J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed
-    if ``anew``; S (m, m) is work. b (m,) becomes the multipliers, x (n,) is reduced by b Y. 0 if
-    ``J1 Y^T`` is zero or not finite; redundant equations are allowed.
-    """
+    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``. A is factorised; J and
+    J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed if ``anew``; S (m, m)
+    is work. b (m,) becomes the multipliers, x (n,) is reduced by b Y. 0 if ``J1 Y^T`` is zero or
+    not finite; redundant equations are allowed."""
     if anew:
         for k in range(b.size):
             for i in indices(x.size):
@@ -462,8 +459,9 @@ def solve_definite(A, L, fixed, b, x):
 @primitive("skfem_ancf.core.loops")
 def solve_many(A, X):
     """X[k] = A^-1 X[k] for all k, with factors of A; X is (m, N)."""
-    if isinstance(A, CoupledBand) and A.lu is not None:
-        X[:] = A.lu.solve(X.T.copy()).T
+    if A.coupled.size > 0 and A.coupled[1] > 0:
+        for x in X:
+            coupling(A, x)
         return
     ab = as_lapack(A)
     if A.top > 0:

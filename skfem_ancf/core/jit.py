@@ -241,11 +241,9 @@ def compiled(function: Any) -> Any:
 
 
 def entry(function: Any, args: Any) -> Any:
-    """A compiled function for Python, for arguments of these types; named tuples become words.
-
-    If the first argument is a named tuple, the function takes the address of its words. Named
-    tuples of numbers are passed as these.
-    """
+    """A compiled function for Python, for arguments of these types; named tuples become words. If
+    the first argument is a named tuple, the function takes the address of its words. Named tuples
+    of numbers are passed as these."""
     names: dict[str, Any] = {"function": function if function in APART else njit(
         inline="always", **OPTIONS)(function)}
     takes, given, signature = list[str](), list[str](), list[Any]()

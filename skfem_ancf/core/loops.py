@@ -4,7 +4,7 @@ of its name that :func:`skfem_ancf.core.source.primitive` marks."""
 import numpy as np
 
 from .callbacks import ask, solved
-from .band import LOST, REPEATED, SPARE, Band
+from .band import LOST, REPEATED, SPARE, Band, coupling
 from .source import F1, apart, source
 
 indices = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.tables import constraint, joint_directions
-from ..core.band import BandMatrix, CoupledBand, factorize, fix, solve
+from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core.callbacks import handle_of
 from ..core import I1, Array, ConvergenceError, SupportError, refuse, require_positive
 from ..core.words import hints

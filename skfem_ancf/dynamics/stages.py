@@ -303,7 +303,8 @@ def _add_rates(e, method, h, w):
         clear(dv)
         for j in range(w.R.shape[0]):
             add_multiple(method.first[k, j] / h, w.R[j], dv)
-        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origins[0], dv, w.stresses, w.independent)
+        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origins[0], dv, w.stresses,
+                           w.independent)
 
 
 @source

@@ -9,9 +9,9 @@ from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_ta
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
-                                  body_tangent)
+                                  body_stress, body_tangent)
 from ..core.band import add_multiple, add_to_diagonal, diagonal, dot, largest, weighted_square
-from ..core.source import F1, F2, MADE, apart, indices, source
+from ..core import F1, F2, MADE, apart, indices, source
 from .tables import Equations
 
 
@@ -173,14 +173,10 @@ LEFT, TRIES, PARTS = 0.5, 12, 16
 
 @apart("contacts", Equations, float, float, F1, F1, F1, F1)
 def hold_back(e, t, loose, u, R, du, dm):
-    """Line search for a correction that runs into obstacles; scales du and dm.
-
-    If ``loose`` is 1, bodies move by no more than an interval, as nothing but contact stops them.
-
-    The residual along the correction, of the equations linearised without contact plus the actual
-    contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close in
-    turn.
-    """
+    """Line search for a correction that runs into obstacles; scales du and dm. If ``loose`` is 1,
+    bodies move by no more than an interval, as nothing but contact stops them. The residual along
+    the correction, of the equations linearised without contact plus the actual contact forces, has
+    to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close in turn."""
     work, two, scratch, ahead = dot(R, du), np.empty(2), np.zeros(u.size), u.copy()
     add_multiple(1.0, du, ahead)
     if loose == 0.0 and nothing_touches(e.forces, u) and nothing_touches(e.forces, ahead):

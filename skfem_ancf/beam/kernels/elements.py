@@ -98,7 +98,7 @@ class Elements:
         self.x = self._last(t.frame, OF_FRAME)
         self.start, self.rest = t.start, self.measured(self.x)
         self._second, self._sample, self._row, self._direction = t.pattern.ends
-        self._last_rows: tuple[Any, ...] = ()  # displacements as bytes, with the results of :meth:`at`
+        self._last_rows: tuple[Any, ...] = ()  # displacements, with the results of :meth:`at`
         # relative DOFs (2 m, ne)
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]

@@ -118,7 +118,6 @@ class ElementKernel:
         return self.scatter(self._forces(u0, u1))
 
     def forces_of(self, stresses: list[Array], u: Array) -> Array:
-        """Element forces of given stresses."""
         return self._forces(u, given=stresses)
 
     def eigenstrain_forces(self, given: list[Array], u: Array, end: Array | None = None) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
 from ...materials.history import AtRest
-from ...core.source import F1, F2, F3, apart, indices, primitive
+from ...core import F1, F2, F3, apart, indices, primitive
 
 #: Kinds of laws: constant moduli, a function of the strain at a point, a law in Python, one with a
 #: history.

@@ -18,8 +18,7 @@ from .law import LINEAR, conserve, law_evaluate
 def run_force(t, u, v, given, out, f):
     """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
     Given stresses act in place of those of the strain; without ``out``, they act without the
-    constant stiffness.
-    """
+    constant stiffness."""
     R, m, ns, du, moving = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v, v.size > 0
     if moving:
         du = v.copy()
