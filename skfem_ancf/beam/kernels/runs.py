@@ -83,14 +83,6 @@ def run_tangent(e, u, given, out, f, flat, ld):
     e.add_to_band(K, flat, ld)
 
 
-def run_gradients(e, u, out):
-    """Write derivatives of the strains and of the weighted stresses, (2, ne, ns, 2 nb)."""
-    _, d, one, Y = e.at(u)
-    both = out.reshape(2, e.ne, e.ns, -1)
-    both[0] = e.derivatives(Y)
-    np.matmul(e.square(e.moduli_at(e.strain(d, one))), both[0], out=both[1])
-
-
 @kernel
 def run_unsymmetric(e, u, v, flat, ld):
     """Add ``B(u)^T D (B(v) - B(u))`` to a matrix, entry (i, j) at ``flat[j * ld + i - j]``."""
