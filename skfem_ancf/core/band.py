@@ -402,8 +402,8 @@ def solve(A, x):
 
 @primitive("skfem_ancf.core.loops")
 def solve_dependent(S, b):
-    """Solve in place of b a system S (m, m), which is work, with redundant equations. S is scaled to
-    a unit diagonal; b becomes the minimum-norm solution in that scale. False if S is zero or not
+    """Solve in place of b a system S (m, m), which is work, with redundant equations. S is scaled
+    to a unit diagonal; b becomes the minimum-norm solution in that scale. False if S is zero or not
     finite."""
     size = np.sqrt(np.abs(np.diagonal(S)))
     size[size == 0.0] = 1.0
