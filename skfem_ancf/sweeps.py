@@ -214,8 +214,8 @@ def _measured(build, measure, member):
 
 
 def _in_order(submit, task, members, most, lost=None):
-    """Yield the index and result of each member, with so many of them in flight. The list ``lost``,
-    if given, gets the indices of those that ended with their process."""
+    """Yield the index and result of each member, with so many of them in flight."""
+    # The list ``lost``, if given, gets the indices of those that ended with their process.
     flying: deque[Any] = deque()
     try:
         for k in range(len(members) + most):
@@ -236,8 +236,8 @@ def _in_order(submit, task, members, most, lost=None):
 
 
 def _in_processes(task, members, workers):
-    """As :func:`_in_order`, in processes started by "spawn"; where one dies, others are started.
-    The members in flight then are repeated one by one, so that only the cause is lost."""
+    """As :func:`_in_order`, in processes started by "spawn"; where one dies, others are started."""
+    # The members in flight then are repeated one by one, so that only the cause is lost.
     import multiprocessing  # takes long
     from concurrent.futures import ProcessPoolExecutor
 

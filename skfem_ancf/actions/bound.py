@@ -509,8 +509,8 @@ def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int)
 
 
 def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array) -> None:
-    """Call a check of derivatives at two generic displacements. It may fail at one of them, where
-    there may be a kink."""
+    """Call a check of derivatives at two generic displacements."""
+    # It may fail at one of them, where there may be a kink.
     angles = np.arange(len(sizes))
     try:
         check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))

@@ -62,10 +62,10 @@ def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
 
 
 def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None = None) -> Array:
-    """The part of eps_yy that a section develops freely and its element cannot represent. A section
-    that bends freely under E0 has a linear eps_xx and S_yy = 0, thus eps_yy = E0_yy - nu (eps_xx -
-    E0_xx). It jumps between layers and may have any degree, while eps_yy of an element is one
-    polynomial. Without this part E0 causes no spurious S_yy."""
+    """The part of eps_yy that a section develops freely and its element cannot represent."""
+    # A section that bends freely under E0 has a linear eps_xx and S_yy = 0, thus eps_yy = E0_yy -
+    # nu (eps_xx - E0_xx). It jumps between layers and may have any degree, while eps_yy of an
+    # element is one polynomial. Without this part E0 causes no spurious S_yy.
     across, degree = beam.across, beam.element.order - 1
     x, y = across.coordinates(X, tind)
     if degree < 1:  # its Poisson coupling is to the mean over the section

@@ -157,9 +157,9 @@ def _in_two(gradient):
 @lru_cache(32)
 def by_loops(psi: Any, gradient: Any, hessian: Any,
              height: float) -> dict[str, Callable[..., Any]]:
-    """Compiled functions of one point as functions of arrays, with missing derivatives of psi.
-    First derivatives are complex steps, second ones differences of these, with steps relative to
-    the height."""
+    """Compiled functions of one point as functions of arrays, with missing derivatives of psi."""
+    # First derivatives are complex steps, second ones differences of these, with steps relative to
+    # the height.
     from numba import njit
 
     steps = REAL * np.array([height] * 2 + [1.0] * 4)

@@ -49,8 +49,8 @@ class Vector:
 
 
 def products(a: Vector, b: Vector, K: Array) -> tuple[Array, Array, Array]:
-    """Second derivative by the DOFs of ``a . K b``, K (2, 2). Rows, columns and values (k,), of a
-    by b: the other half has both exchanged."""
+    """Second derivative by the DOFs of ``a . K b``, K (2, 2)."""
+    # Rows, columns and values (k,), of a by b: the other half has both exchanged.
     values = np.einsum("ij,ik,jl->ikjl", K, a.weights, b.weights)
     return dense_entries(a.dofs, b.dofs, values)
 

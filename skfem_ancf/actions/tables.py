@@ -220,8 +220,8 @@ def mean_external_force(loads, factors, t, u0, u1, out):
 
 @apart("statics", LoadTables, F1, float, float, F1, Band)
 def add_load_stiffness(loads, factors, t, scale, u, A):
-    """Subtract the derivative of :func:`external_force` from a band matrix. If only the lower half
-    is stored, symmetric entries come first, then the upper half."""
+    """Subtract the derivative of :func:`external_force` from a band matrix."""
+    # If only the lower half is stored, symmetric entries come first, then the upper half.
     lower = A.flat[A.top:]
     if loads.moments.M.size > 0:
         add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)

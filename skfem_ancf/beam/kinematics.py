@@ -38,8 +38,8 @@ def require_cable(beam: Any) -> None:
 
 
 def locate(beam: Any, point: Any) -> tuple[int, Array]:
-    """The element of a material point (x, y) or named end, and its point (xi, eta) of the cell.
-    Raises MeshError outside of the beam."""
+    """The element of a material point (x, y) or named end, and its point (xi, eta) of the cell."""
+    # Raises MeshError outside of the beam.
     e, X, _ = beam.finder.inside(as_point(point, beam.mesh)[:, None])
     return int(e[0]), X[:, 0]
 
@@ -75,8 +75,8 @@ def entries_of(dofs: Array) -> tuple[Array, Array]:
 
 
 def direction(beam: Any, node: int) -> tuple[Array, Array]:
-    """DOFs (2, n) and weights (n,) of ``12 / h^3 int Y r dY`` of a section. For a cable, those of
-    the tangent."""
+    """DOFs (2, n) and weights (n,) of ``12 / h^3 int Y r dY`` of a section."""
+    # For a cable, those of the tangent.
     if not beam.has_sections:
         return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
     eta, w = gauss(beam.element.order + 1)
@@ -152,8 +152,8 @@ def shortest(beam: Any, u: Array) -> float:
 
 
 def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
-    """det F and principal stretches at the integration points. They are linear in a
-    :func:`~skfem_ancf.core.linear.step`."""
+    """det F and principal stretches at the integration points."""
+    # They are linear in a :func:`~skfem_ancf.core.linear.step`.
     if not beam.has_sections:
         along = beam.kernel.outer_stretches(u)
         ratio = beam.across.layers[0].material.lateral_ratio
@@ -180,8 +180,8 @@ def tangents(beam: Any, u: Array | float) -> Array:
 
 
 def bent(beam: Any, u: Array) -> tuple[float, bool]:
-    """Largest rotation of the axis over an element, and True if it folds back within one. Then a
-    chord is opposite to a tangent at its end."""
+    """Largest rotation of the axis over an element, and True if it folds back within one."""
+    # Then a chord is opposite to a tangent at its end.
     axis, t = beam.q0_local.reshape(-1, beam.nd // 2, 2)[:, :2], beam.mesh.t
     r, slope = (axis + u.reshape(axis.shape[0], -1, 2)[:, :2])[t].view(complex)[..., 0].transpose(
         2, 0, 1)

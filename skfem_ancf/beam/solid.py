@@ -29,8 +29,8 @@ def moduli_at(law: Any, F: Array, strain: Array) -> Array:
 
 
 def displacement_strain(H: Array) -> Array:
-    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) of a displacement gradient (2, 2, ...). It
-    has no cancellation at small strain."""
+    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) of a displacement gradient (2, 2, ...)."""
+    # It has no cancellation at small strain.
     square = np.einsum("ki...,kj...->ij...", H, H)
     return np.array([H[0, 0] + 0.5 * square[0, 0], H[1, 1] + 0.5 * square[1, 1],
                      H[0, 1] + H[1, 0] + square[0, 1]])

@@ -53,8 +53,9 @@ def tables_of(body, k):
 
 
 def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = False) -> Body:
-    """The Body of beams with their slices of DOFs. With ``joined``, tables with the same samples
-    are merged, so that many short beams are as fast as a long one."""
+    """The Body of beams with their slices of DOFs."""
+    # With ``joined``, tables with the same samples are merged, so that many short beams are as fast
+    # as a long one.
     if len(beams) == 1:
         return _body([beams[0].kernel.tables], lambda t: t.rows.shape[1], beams[0].kernel)
     tables = [[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
@@ -92,8 +93,8 @@ def _body(tables, numbers, kernel=None):
 
 
 def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float]) -> Body:
-    """The Body of viscous stresses for the beams' retardation times; ``body`` if all are zero.
-    Stresses have the same positions as in ``body``."""
+    """The Body of viscous stresses for the beams' retardation times; ``body`` if all are zero."""
+    # Stresses have the same positions as in ``body``.
     packs: list[StrainTables] = []
     rows, first = [], 0
     for beam, time in zip(beams, times):
@@ -148,8 +149,8 @@ def body_force(body, u, f):
 
 @source
 def body_tangent(body, u, f, independent, use_independent, stresses, A):
-    """Internal force, lower half of the tangent without loads, and stresses. The geometric part
-    uses the independent stresses if ``use_independent``."""
+    """Internal force, lower half of the tangent without loads, and stresses."""
+    # The geometric part uses the independent stresses if ``use_independent``.
     clear(f)
     clear(A.flat)
     given = independent if use_independent else independent[:0]
@@ -206,8 +207,8 @@ def body_mean(body, u0, u1, f):
 
 @source
 def body_mixed(body, mean, u0, u1, f, independent, stresses):
-    """As :func:`body_force` at u1, or :func:`body_mean`, but for independent stresses. The stresses
-    of the strain are written."""
+    """As :func:`body_force` at u1, or :func:`body_mean`, but for independent stresses."""
+    # The stresses of the strain are written.
     clear(f)
     _add_force(body, u0 if mean else u1, u1 if mean else u1[:0], independent, stresses, f)
 

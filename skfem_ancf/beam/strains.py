@@ -143,10 +143,10 @@ def _sum(tables, x, at):
 
 def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
               across: Rule | None = None) -> Array:
-    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), shape (3, n). ``u`` (N,) is the
-    displacement, ``e`` (n,) are elements, ``X`` (2, n) points of the reference cell. Each component
-    is sampled and interpolated as ``term`` says, by default the first term of the formulation.
-    ``across``, points and weights, gives the mean over sections."""
+    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), shape (3, n)."""
+    # ``u`` (N,) is the displacement, ``e`` (n,) are elements, ``X`` (2, n) points of the reference
+    # cell. Each component is sampled and interpolated as ``term`` says, by default the first term
+    # of the formulation. ``across``, points and weights, gives the mean over sections.
     if not beam.has_sections:
         longer, ratio = fibres(beam, e, X, *cable_axis(beam, u, e, X[0])[1:])
         xx = longer + 0.5 * longer * longer
@@ -197,9 +197,9 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
 
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:
-    """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements. X is (2, npoints) or
-    (2, nelements, npoints), tind the elements or None for all; the result is (3, nelements,
-    npoints)."""
+    """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements."""
+    # X is (2, npoints) or (2, nelements, npoints), tind the elements or None for all; the result is
+    # (3, nelements, npoints).
     tind = np.arange(beam.mesh.nelements) if tind is None else tind
     shape = len(tind), X.shape[-1]
     points = X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0])
@@ -234,8 +234,9 @@ def stretched(xx: Array) -> tuple[Array, Array]:
 
 
 def cable_axis(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Any, Any, Any, Any]:
-    """The axis of a cable at xi (n,) of elements e (n,). Unit tangents before and after, (2, 2, n);
-    stretch - 1, change of curvature, and initial curvature, (n,)."""
+    """The axis of a cable at xi (n,) of elements e (n,)."""
+    # Unit tangents before and after, (2, 2, n); stretch - 1, change of curvature, and initial
+    # curvature, (n,).
     L, basis = beam.mesh.lengths[e], beam.interpolation
     derivatives = []
     for q in (beam.q0_local, u):

@@ -27,9 +27,9 @@ class Unreadable(ValueError):
 
 
 def read(path: Path) -> dict[str, Array]:
-    """Read named arrays from a .npz file that :func:`write` wrote. Memory is bounded by the size of
-    the file, and nothing in it is executed. Raises OSError if the file cannot be opened, and
-    Unreadable if it is compressed, damaged or something else."""
+    """Read named arrays from a .npz file that :func:`write` wrote."""
+    # Memory is bounded by the size of the file, and nothing in it is executed. Raises OSError if
+    # the file cannot be opened, and Unreadable if it is compressed, damaged or something else.
     with open(path, "rb") as file:
         try:
             size = os.fstat(file.fileno()).st_size
@@ -50,9 +50,9 @@ def read(path: Path) -> dict[str, Array]:
 
 @contextmanager
 def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
-    """A new, empty file that replaces ``path`` when the block ends, or is removed on an error.
-    Links are not followed, and the file mode is kept. With ``durable`` the new file, of the same
-    suffix, is synchronised to disk first."""
+    """A new, empty file that replaces ``path`` when the block ends, or is removed on an error."""
+    # Links are not followed, and the file mode is kept. With ``durable`` the new file, of the same
+    # suffix, is synchronised to disk first.
     new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
     new.touch(0o600 if path.is_file() else 0o666, exist_ok=False)
     try:

@@ -96,9 +96,9 @@ class BandMatrix(Band):
         self.factors = None
 
     def add_elements(self, K: Array, start: int, nd: int, left: Array) -> None:
-        """Add matrices K (ne, 2 nd, 2 nd) that couple node k and k + 1 of a chain. ``start`` is the
-        first row of node 0, ``nd`` the number of DOFs of a node, ``left`` (ne,) the increasing left
-        nodes. K is overwritten if the matrix is symmetric."""
+        """Add matrices K (ne, 2 nd, 2 nd) that couple node k and k + 1 of a chain."""
+        # ``start`` is the first row of node 0, ``nd`` the number of DOFs of a node, ``left`` (ne,)
+        # the increasing left nodes. K is overwritten if the matrix is symmetric.
         m, item, ld = 2 * nd, self.flat.itemsize, self.ld
         if self.symmetric:  # the upper half would overlap other entries
             K *= np.tri(m)
@@ -192,9 +192,9 @@ class BandMatrix(Band):
         return self.factors.flat[::self.ld].copy()
 
     def inertia(self) -> Inertia:
-        """Inertia of a symmetric matrix, by Sylvester's law. If Cholesky fails, the matrix is
-        eliminated block by block along the chain; blocks whose elimination lets entries grow are
-        merged with the next. ValueError if it is not symmetric."""
+        """Inertia of a symmetric matrix, by Sylvester's law."""
+        # If Cholesky fails, the matrix is eliminated block by block along the chain; blocks whose
+        # elimination lets entries grow are merged with the next. ValueError if it is not symmetric.
         if not self.symmetric:
             raise ValueError("the inertia needs a symmetric matrix")
         if self.factors is None:
@@ -354,8 +354,8 @@ def add_multiple(c, x, y):
 
 @primitive("skfem_ancf.core.loops")
 def factorize(A):
-    """Factorise in place; False if a pivot is round-off. Only LAPACK's storage is pivoted. An
-    indefinite symmetric matrix has L D L^T factors unless a leading submatrix is singular."""
+    """Factorise in place; False if a pivot is round-off. Only LAPACK's storage is pivoted."""
+    # An indefinite symmetric matrix has L D L^T factors unless a leading submatrix is singular.
     if A.coupled.size > 0:
         if not coupling(A, A.flat[:0]):
             return False
@@ -374,8 +374,9 @@ def factorize(A):
 
 
 def _eliminate(A):
-    """L D L^T of an indefinite symmetric matrix. Entries of a row are ld - 1 apart, so that the
-    next columns form a strided square, whose upper triangle belongs to other entries."""
+    """L D L^T of an indefinite symmetric matrix."""
+    # Entries of a row are ld - 1 apart, so that the next columns form a strided square, whose upper
+    # triangle belongs to other entries.
     columns = as_lapack(A).T
     n, stride = len(columns), columns.itemsize
     lower = np.tri(min(A.width, n - 1)).T  # rows are columns
@@ -402,9 +403,9 @@ def solve(A, x):
 
 @primitive("skfem_ancf.core.loops")
 def solve_dependent(S, b):
-    """Solve in place of b a system S (m, m), which is work, with redundant equations. S is scaled
-    to a unit diagonal; b becomes the minimum-norm solution in that scale. False if S is zero or not
-    finite."""
+    """Solve in place of b a system S (m, m), which is work, with redundant equations."""
+    # S is scaled to a unit diagonal; b becomes the minimum-norm solution in that scale. False if S
+    # is zero or not finite.
     size = np.sqrt(np.abs(np.diagonal(S)))
     size[size == 0.0] = 1.0
     A = S / (size[:, None] * size)
@@ -422,10 +423,10 @@ def subtract_rows(J, x, out):
 
 @apart("bands", Band, F2, F2, F1, bool, F2, F2, F1, F1, returns=int)
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
-    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``. A is factorised; J and
-    J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed if ``anew``; S (m, m)
-    is work. b (m,) becomes the multipliers, x (n,) is reduced by b Y. 0 if ``J1 Y^T`` is zero or
-    not finite; redundant equations are allowed."""
+    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``."""
+    # A is factorised; J and J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is
+    # recomputed if ``anew``; S (m, m) is work. b (m,) becomes the multipliers, x (n,) is reduced by
+    # b Y. 0 if ``J1 Y^T`` is zero or not finite; redundant equations are allowed.
     if anew:
         for k in range(b.size):
             for i in indices(x.size):
@@ -473,8 +474,9 @@ def solve_many(A, X):
 
 @primitive("skfem_ancf.core.loops")
 def factorize_complex(A, width):
-    """L D L^T of a complex symmetric band in place; False if it fails. A has real parts, then
-    imaginary parts, each as in a symmetric :class:`Band` of half bandwidth ``width``."""
+    """L D L^T of a complex symmetric band in place; False if it fails."""
+    # A has real parts, then imaginary parts, each as in a symmetric :class:`Band` of half bandwidth
+    # ``width``.
     ld = width + 1 + SPARE
     n, flat = A.size // (2 * ld), np.append(_complex(A), np.zeros((width + 1) * ld))
     for j in range(n):

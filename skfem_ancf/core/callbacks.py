@@ -87,8 +87,8 @@ FORCE, MEAN_FORCE, STIFFNESS, JOINTS, ELEMENTS, POSES = range(6)
 
 @primitive("skfem_ancf.core.loops")
 def call_custom(callback, handle, what, t, x, a, b, out):
-    """Call the object of user-defined items, with a selector, a time, a factor and three arrays.
-    The time of forces is nan in statics."""
+    """Call the object of user-defined items, with a selector, a time, a factor and three arrays."""
+    # The time of forces is nan in statics.
     called = owner(handle)
     if callback == FORCE:
         called.add_custom_force(t, x, a, out)
@@ -121,9 +121,9 @@ _raised: dict[int, BaseException] = {}
 
 
 def kept(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that keeps its first exception for :func:`raise_kept` and returns zero. The kernel
-    goes on until it returns: what it asks for after an exception has to fail again, so that it
-    accepts no step or solution."""
+    """A function that keeps its first exception for :func:`raise_kept` and returns zero."""
+    # The kernel goes on until it returns: what it asks for after an exception has to fail again, so
+    # that it accepts no step or solution.
     def run(*args):
         try:
             return function(*args)

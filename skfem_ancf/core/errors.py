@@ -278,8 +278,8 @@ _FLOAT, _NUMBERS = np.dtype(float), {int, float, np.float64}
 
 def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None,
                    example: str = "") -> Array:
-    """An array of finite real numbers as float64; None in ``shape`` is any extent. The message on a
-    wrong shape ends with the value, and with an ``example`` of what works."""
+    """An array of finite real numbers as float64; None in ``shape`` is any extent."""
+    # The message on a wrong shape ends with the value, and with an ``example`` of what works.
     given = array
     if not (type(array) is np.ndarray and array.dtype is _FLOAT):
         if type(given) is not tuple or not _NUMBERS.issuperset(map(type, given)):
@@ -387,8 +387,9 @@ def along(function: Callable[[float], Any]) -> list[Array]:
 
 def require_slope(what: str, of: str, values: Sequence[Any], slope: Any, noise: float | None = None,
                   else_: str = "") -> None:
-    """Raise InputError unless ``slope`` is the derivative of ``values`` of :func:`along`. ``what``
-    and ``of`` are names of derivative and function; ``noise`` is the round-off of a difference."""
+    """Raise InputError unless ``slope`` is the derivative of ``values`` of :func:`along`."""
+    # ``what`` and ``of`` are names of derivative and function; ``noise`` is the round-off of a
+    # difference.
     change, slope = np.ravel(values[2] - values[0]), 2.0 * np.ravel(slope)
     off = np.abs(change - slope)
     if noise is None:
@@ -494,8 +495,8 @@ def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
 
 @contextmanager
 def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator[None]:
-    """Convert any exception of the block to the error ``kind`` with a hint. ``what`` is formatted
-    with ``of``. Errors of the package pass unchanged."""
+    """Convert any exception of the block to the error ``kind`` with a hint."""
+    # ``what`` is formatted with ``of``. Errors of the package pass unchanged.
     try:
         yield
     except AncfError:
@@ -505,9 +506,9 @@ def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator
 
 
 def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
-    """Call a user's function; its exceptions become :class:`CallbackError`. ``what`` describes the
-    call, as "amplitude(t={:g})", and is formatted with the arguments. Errors of the package pass
-    unchanged."""
+    """Call a user's function; its exceptions become :class:`CallbackError`."""
+    # ``what`` describes the call, as "amplitude(t={:g})", and is formatted with the arguments.
+    # Errors of the package pass unchanged.
     try:
         return function(*args)
     except AncfError:
@@ -625,9 +626,9 @@ FEW = 8
 
 def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "function",
            shape: tuple[int, ...] | None = None) -> Array:
-    """Evaluate a function of time at times (n,), shape (n,) + shape of its value. If the function
-    accepts arrays, it is called once. This is checked at the first, the middle and the last time.
-    ``shape`` is the expected shape of a value, None for any."""
+    """Evaluate a function of time at times (n,), shape (n,) + shape of its value."""
+    # If the function accepts arrays, it is called once. This is checked at the first, the middle
+    # and the last time. ``shape`` is the expected shape of a value, None for any.
     require_function(name, function, "of time")
     times = require_finite("times", times, (None,))
 

@@ -29,8 +29,8 @@ class _Packed:
 
 
 def packed(value: Any) -> Any:
-    """A value for pickle: forms by the name that they share with the decorated function. Pickle
-    takes an OrientedBoundary for a view of an array and loses the orientation."""
+    """A value for pickle: forms by the name that they share with the decorated function."""
+    # Pickle takes an OrientedBoundary for a view of an array and loses the orientation.
     if isinstance(value, Form):
         module, name = (getattr(value.form, x, None) for x in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(str(module)), str(name), None) is value:
@@ -157,8 +157,8 @@ class Immutable(metaclass=_Freezing):
 
 
 def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
-    """A copy with changed arguments; the others are the attributes of the same names. ``more`` are
-    names that the constructor passes on by ``**kwargs``."""
+    """A copy with changed arguments; the others are the attributes of the same names."""
+    # ``more`` are names that the constructor passes on by ``**kwargs``.
     arguments = inspect.signature(type(thing)).parameters.values()
     names = [a.name for a in arguments if a.kind in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY)]
     several = [a for a in arguments if a.kind in (a.VAR_POSITIONAL, a.VAR_KEYWORD)

@@ -241,9 +241,9 @@ def compiled(function: Any) -> Any:
 
 
 def entry(function: Any, args: Any) -> Any:
-    """A compiled function for Python, for arguments of these types; named tuples become words. If
-    the first argument is a named tuple, the function takes the address of its words. Named tuples
-    of numbers are passed as these."""
+    """A compiled function for Python, for arguments of these types; named tuples become words."""
+    # If the first argument is a named tuple, the function takes the address of its words. Named
+    # tuples of numbers are passed as these.
     names: dict[str, Any] = {"function": function if function in APART else njit(
         inline="always", **OPTIONS)(function)}
     takes, given, signature = list[str](), list[str](), list[Any]()
@@ -307,8 +307,8 @@ def _words(x, known):
 
 def address(function: Any, hints: Any, name: str = "", kept: bool = True,
             returns: Any = None) -> int:
-    """The address of a compiled function with annotated arguments, see :func:`caller`. ``name``
-    distinguishes it on disk; it is cached if ``kept``."""
+    """The address of a compiled function with annotated arguments, see :func:`caller`."""
+    # ``name`` distinguishes it on disk; it is cached if ``kept``.
     signature, function = SCALARS[returns](*map(type_of, hints)), _named(function, name)
 
     def made(**options):

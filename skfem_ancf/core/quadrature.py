@@ -18,8 +18,8 @@ MAX_POINTS = 1000
 
 
 def gauss(n: int) -> Rule:
-    """n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,). The
-    arrays are read-only."""
+    """n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
+    # The arrays are read-only.
     if type(n) is not int or not 1 <= n <= MAX_POINTS:
         n = require_integer("the number of Gauss points n", n, 1, MAX_POINTS)
     return _gauss(n)
@@ -44,8 +44,9 @@ def _lobatto(n: int) -> Array:
 
 
 def tensor(axis: Rule, section: Rule) -> Rule:
-    """Tensor product of rules along the axis and across the section. Returns points (2, n), the
-    section fastest, and weights (n,), as for scikit-fem's ``Basis(quadrature=(X, W))``."""
+    """Tensor product of rules along the axis and across the section."""
+    # Returns points (2, n), the section fastest, and weights (n,), as for scikit-fem's
+    # ``Basis(quadrature=(X, W))``.
     rules = []
     for name, rule in (("axis", axis), ("section", section)):
         if not isinstance(rule, (tuple, list)) or len(rule) != 2:
@@ -79,10 +80,10 @@ def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
 
 @lru_cache
 def _hermite_coefficients(m: int, derivative: int) -> Array:
-    """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
-    Bernstein coefficients times binomials, (2 m, n + 1 - derivative): without cancellation, as all
-    have one sign (Farouki and Rajan, "On the numerical condition of polynomials in Bernstein form",
-    Computer Aided Geometric Design 4, 1987)."""
+    """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1."""
+    # Bernstein coefficients times binomials, (2 m, n + 1 - derivative): without cancellation, as
+    # all have one sign (Farouki and Rajan, "On the numerical condition of polynomials in Bernstein
+    # form", Computer Aided Geometric Design 4, 1987).
     n = 2 * m - 1
     left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]
             for k in range(m)]
@@ -98,8 +99,8 @@ _POWERS = np.arange(64)[:, None]
 
 
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
-    """Hermite functions of degree 2 m - 1 with derivatives 0 ... m-1 at 0, then at 1. Shape (2 m,)
-    + xi.shape."""
+    """Hermite functions of degree 2 m - 1 with derivatives 0 ... m-1 at 0, then at 1."""
+    # Shape (2 m,) + xi.shape.
     x, degree = np.asarray(xi), 2 * m - 1 - derivative
     if degree < 0:
         return np.zeros((2 * m,) + x.shape)

@@ -61,9 +61,9 @@ APART: dict[Any, Apart] = {}
 
 
 def apart(part: str, *takes: Any, returns: Any = None) -> Callable[[_Function], _Function]:
-    """Mark a function that is compiled once for all callers, which call it by its address. LLVM
-    optimises others again in each caller, and in the callers of that. ``part`` is a name of what is
-    loaded together, ``takes`` are annotations of the arguments."""
+    """Mark a function that is compiled once for all callers, which call it by its address."""
+    # LLVM optimises others again in each caller, and in the callers of that. ``part`` is a name of
+    # what is loaded together, ``takes`` are annotations of the arguments.
     def mark(function: _Function) -> _Function:
         APART[function] = Apart(part, takes, returns)
         return source(function)

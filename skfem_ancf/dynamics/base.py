@@ -205,9 +205,9 @@ def difference_row(x: Array) -> Array:
 
 def derivative(old: Motion, new: Motion, t: float, value: Array,
                order: int) -> tuple[int, Array, Array | None]:
-    """The two highest derivatives of a function from its values in this step and previous ones.
-    Returns the order, the derivative of that order and that of one order less, or None; the values
-    are stored in ``new.memory``."""
+    """The two highest derivatives of a function from its values in this step and previous ones."""
+    # Returns the order, the derivative of that order and that of one order less, or None; the
+    # values are stored in ``new.memory``.
     before = old.memory or {}
     values = np.concatenate([value[None], before.get("values", value[None][:0])])[:order + 1]
     times = np.append(t, before.get("times", ()))[:order + 1]

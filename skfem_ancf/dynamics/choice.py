@@ -95,8 +95,8 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
 
 
 def stiffness_ratio(system: System) -> float:
-    """Largest ratio of the highest axial frequency to the lowest bending frequency of a beam. A
-    wave crosses an element of length L / n in ``L / (n c)``, bending has the frequency ``pi^2 c h /
-    (sqrt(12) L^2)``: the ratio is about ``0.7 n L / h``."""
+    """Largest ratio of the highest axial frequency to the lowest bending frequency of a beam."""
+    # A wave crosses an element of length L / n in ``L / (n c)``, bending has the frequency ``pi^2 c
+    # h / (sqrt(12) L^2)``: the ratio is about ``0.7 n L / h``.
     return max((0.7 * b.mesh.nelements * float(np.sum(b.mesh.lengths)) / b.mesh.height
                 for b in system.beams), default=1.0)

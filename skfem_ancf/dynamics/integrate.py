@@ -38,9 +38,9 @@ def integrate(system: System, scheme: Scheme, start: State | None, u: Array | No
               sensors: Sequence[tuple[str, Sensor]], progress: bool | None,
               until: Callable[[State], float] | None, check: bool, checkpoint: StrPath | None,
               every: int | None, t_start: float | None, **times: Any) -> History:
-    """Integrate the equation of motion, see :meth:`skfem_ancf.Scene.integrate`. ``u`` and ``v``
-    (N,) are the displacement of ``start``, if there is one, and the velocity of a start that is no
-    instant of a motion; ``times`` are the other arguments of :func:`task_of`."""
+    """Integrate the equation of motion, see :meth:`skfem_ancf.Scene.integrate`."""
+    # ``u`` and ``v`` (N,) are the displacement of ``start``, if there is one, and the velocity of a
+    # start that is no instant of a motion; ``times`` are the other arguments of :func:`task_of`.
     if t_start is None:
         t_start = 0.0 if start is None or start._motion is None else start._motion.t
     task = task_of(t_start, **times, sampled=system.forces.sampled)

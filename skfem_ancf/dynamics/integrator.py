@@ -173,8 +173,8 @@ class Integrator:
 
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
               history: Array | None = None) -> Motion:
-        """The initial Motion, with consistent velocity, acceleration and multipliers. Rates of
-        functions of time are those in a step dt after t, or before t unless ``ahead``."""
+        """The initial Motion, with consistent velocity, acceleration and multipliers."""
+        # Rates of functions of time are those in a step dt after t, or before t unless ``ahead``.
         s, M, (free, m) = self.system, self.system.mass, (self.system.constraints.free, self.m)
         instant = TimeFunctions(s, np.array([0.0 if ahead else 1.0]), SAMPLES)
         given = instant.of(t if ahead else t - dt, dt, (0, 1), self.limit)
@@ -282,9 +282,9 @@ class Integrator:
 
     def _call(self, function: Callable, y: Motion, dt: float, out: tuple[Array, Array],
               *args: Any) -> int:
-        """Call a compiled function that takes steps; returns how many succeeded. On Ctrl-C it
-        counts the steps that are complete in the arrays ``out`` of NaN, the first of which has the
-        displacements, and sets ``stopped``."""
+        """Call a compiled function that takes steps; returns how many succeeded."""
+        # On Ctrl-C it counts the steps that are complete in the arrays ``out`` of NaN, the first of
+        # which has the displacements, and sets ``stopped``.
         s, state, before, rows = self.system, self._state, np.array(self._state), out[0]
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
@@ -369,9 +369,9 @@ class Integrator:
         return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
 
     def leap(self, y: Motion, dt: float) -> Motion | None:
-        """A longer step past a singular position of the joints, or None. For example, all bars of a
-        linkage may be collinear: steps that end there do not converge. Collocation, which
-        linearises joints once per step, uses an energy-momentum step here."""
+        """A longer step past a singular position of the joints, or None."""
+        # For example, all bars of a linkage may be collinear: steps that end there do not converge.
+        # Collocation, which linearises joints once per step, uses an energy-momentum step here.
         system = self.system
         if not self.m or system.forces.contacts.obstacles or system.histories.evolve:
             return None

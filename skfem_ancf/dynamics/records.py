@@ -58,8 +58,8 @@ def damping_force(e, dampers, M, t, u, v, mixed, out, scratch):
 
 @source
 def add_damping(viscous, dampers, M, factor, u, stresses, scratch, A):
-    """Add the derivative of :func:`damping_force` by v, times a factor, to a symmetric band. Modal
-    damping is excluded. ``stresses`` (3, n) is work, its first row zero."""
+    """Add the derivative of :func:`damping_force` by v, times a factor, to a symmetric band."""
+    # Modal damping is excluded. ``stresses`` (3, n) is work, its first row zero.
     if dampers.viscous > 0:
         yes = dampers.viscous > 0
         body_tangent(viscous, u, scratch, stresses[0], yes, stresses[2], dampers.D)
@@ -167,8 +167,8 @@ def acceleration_of_joints(joints, motion, t, dt, u, v, out):
 
 @source
 def _add_differences(joints, t, dt, u, v, first, second, along, out):
-    """Custom joints: out += first Phi' + second Phi'' + along (J v)', by differences. Joints that
-    do not move have none."""
+    """Custom joints: out += first Phi' + second Phi'' + along (J v)', by differences."""
+    # Joints that do not move have none.
     values = np.empty(out.size)
     for part in range(PARTS + 1):
         time = t - part * dt / PARTS
@@ -315,9 +315,9 @@ ALL = Equations, Matrices, Annotated[Rule, MADE], Annotated[Step, MADE], Work, S
 
 @source
 def settle(e, t, along, u0, u1, v1, taken):
-    """Update the history at the end of a step; ``taken`` is the dissipated work. ``t`` are the
-    instants of the forces of contact and of the end. Contact works from u0 to u1 in the time
-    ``along`` of a conserving step, or at u1 if that is 0."""
+    """Update the history at the end of a step; ``taken`` is the dissipated work."""
+    # ``t`` are the instants of the forces of contact and of the end. Contact works from u0 to u1 in
+    # the time ``along`` of a conserving step, or at u1 if that is 0.
     settle_contact(e.forces, t[0], along, u0 if along > 0.0 else u1, u1, taken)
     settle_elements(e.forces, t[1], u0, u1, v1, taken)
     accept_body(e.body, u0, u1, taken)

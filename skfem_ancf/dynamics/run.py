@@ -157,8 +157,8 @@ class Task:
 
 def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
             breakpoints: Any, sampled: Sequence[Any] = ()) -> Task:
-    """Check arguments of :meth:`skfem_ancf.Scene.integrate`. ``sampled`` are controllers with
-    zero-order hold, whose samples are ends of steps."""
+    """Check arguments of :meth:`skfem_ancf.Scene.integrate`."""
+    # ``sampled`` are controllers with zero-order hold, whose samples are ends of steps.
     t_start = require_finite_scalar("t_start", t_start)
     t_end = require_finite_scalar("t_end", t_end)
     span = require_positive("t_end - t_start", t_end - t_start)
@@ -228,9 +228,9 @@ class Run:
     # the start
 
     def begin(self, start: State | None, u: Array | None, v: Array) -> None:
-        """Start from a State, or from rest: the displacement, and a velocity unless it moves. Of a
-        motion by the same scheme the run takes the step size; with the same scene it goes on
-        exactly."""
+        """Start from a State, or from rest: the displacement, and a velocity unless it moves."""
+        # Of a motion by the same scheme the run takes the step size; with the same scene it goes on
+        # exactly.
         system, task, turns, goes_on = self.system, self.task, None, False
         motion = None if start is None else start._motion
         if start is not None and motion is not None:
@@ -429,8 +429,8 @@ class Run:
         self._stored.append(row)
 
     def _between(self, old, new, t):
-        """The motion within a step, by a shorter step from the same start. Order, conserved
-        quantities and closed joints are thus those of the scheme."""
+        """The motion within a step, by a shorter step from the same start."""
+        # Order, conserved quantities and closed joints are thus those of the scheme.
         h, s = new.t - old.t, (t - old.t) / (new.t - old.t)
         if s > 1.0 - 1e-12:
             return new

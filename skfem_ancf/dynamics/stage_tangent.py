@@ -244,8 +244,8 @@ def join(method, s, w, k, r, q, x, y):
 
 @source
 def _combine(K, M, D, fixed, c, m, d, out):
-    """``c K + m M + d D`` with the supports fixed, the lower half of each column. Of an unsymmetric
-    K, its symmetric part; the iteration corrects the rest."""
+    """``c K + m M + d D`` with the supports fixed, the lower half of each column."""
+    # Of an unsymmetric K, its symmetric part; the iteration corrects the rest.
     ld, top = K.width + 1 + SPARE, K.top
     n, x, y, z = out.size // ld, K.flat, M.flat, D.flat
     columns = shaped(out, (n, ld))

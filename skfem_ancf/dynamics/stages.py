@@ -28,9 +28,9 @@ CLOSINGS = 2
 
 @source
 def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, points):
-    """Take steps from ``w.y`` and ``w.first``; returns how many succeeded. Written for each step as
-    by :func:`~skfem_ancf.dynamics.steps.steps`, w is the acceleration; and displacements and
-    multipliers of the points, (s, n, N + m)."""
+    """Take steps from ``w.y`` and ``w.first``; returns how many succeeded."""
+    # Written for each step as by :func:`~skfem_ancf.dynamics.steps.steps`, w is the acceleration;
+    # and displacements and multipliers of the points, (s, n, N + m).
     method = w.method
     taken = np.empty(1)
     if e.lasting > 0:
@@ -177,8 +177,8 @@ def _end(e, matrices, method, s, w, state, step):
 
 @source
 def _balance(e, matrices, s, w, at):
-    """The acceleration at the end of the step by its forces, without joints. If the last point is
-    the end, the points give it without amplifying errors by the stiffness."""
+    """The acceleration at the end of the step by its forces, without joints."""
+    # If the last point is the end, the points give it without amplifying errors by the stiffness.
     u, v, a, f, Q, scratch = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
     constrained, t = row_of(s.constrained, at), s.times[at]
     e.span[0] = s.h
@@ -227,8 +227,8 @@ def _meet(mass, free, w, x, anew):
 
 @source
 def _start(e, matrices, method, s, w, state, step):
-    """Set the initial guess; in the mixed iteration from the mean acceleration of the last step. A
-    polynomial through the vibrations of a stiff beam extrapolates badly."""
+    """Set the initial guess; in the mixed iteration from the mean acceleration of the last step."""
+    # A polynomial through the vibrations of a stiff beam extrapolates badly.
     for k in range(w.Z.shape[0]):
         copy(w.guess[k], w.Z[k])
         copy(w.first[k], w.l[k])
@@ -334,8 +334,8 @@ def _residual(e, matrices, method, s, w, state, step, k):
 
 @source
 def _correct(free, method, s, w, state):
-    """Correct Z and the multipliers; R becomes the correction. False for dependent joints. V is
-    used as work array."""
+    """Correct Z and the multipliers; R becomes the correction. False for dependent joints."""
+    # V is used as work array.
     n, N, m, b, work, closing = (method.points.size, free.size, w.l.shape[1], w.J.shape[0], 0.0,
                                  0.0)
     D, dl, x, y, r, q = w.V, w.dl, w.x[0], w.x[1], w.r, w.q

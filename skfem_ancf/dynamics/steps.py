@@ -124,9 +124,9 @@ def close_acceleration(e, matrices, rule, s, w, state):
 
 @apart("damping", *ALL)
 def add_work(e, matrices, rule, s, w, state):
-    """Add the work of damping at the mean velocity of the step. In the conserving scheme this is
-    the work of its force. In others the mean force of both ends could have negative work, because
-    of unresolved vibrations."""
+    """Add the work of damping at the mean velocity of the step."""
+    # In the conserving scheme this is the work of its force. In others the mean force of both ends
+    # could have negative work, because of unresolved vibrations.
     u, u0, d, middle = w.x.u, w.y[0], w.x.damping, w.x.middle
     damping_velocity = w.x.damping_velocity
     for i in indices(u.size):
@@ -170,9 +170,9 @@ def finish(e, matrices, rule, s, w, state):
 
 @source
 def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _):
-    """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded. Written
-    for each step: work of damping and history, (n, 1 + k); u, v, a and w, (n, 4, N); multipliers at
-    the end and where they were evaluated, (n, 2, m)."""
+    """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded."""
+    # Written for each step: work of damping and history, (n, 1 + k); u, v, a and w, (n, 4, N);
+    # multipliers at the end and where they were evaluated, (n, 2, m).
     contacts, taken = e.forces.contacts, np.empty(1)
     for n in range(rows.shape[0]):
         s = step_of(e.joints, rule, data, n)
@@ -264,8 +264,8 @@ def _end(e, matrices, rule, s, w, state):
 
 @apart("motion", *ALL, F1)
 def _predict(e, matrices, rule, s, w, state, limits):
-    """Set all that does not depend on u_1, and the initial guess with the acceleration at 0.
-    ``limits`` get the reference of the tolerance, and the round-off of a correction."""
+    """Set all that does not depend on u_1, and the initial guess with the acceleration at 0."""
+    # ``limits`` get the reference of the tolerance, and the round-off of a correction.
     h, u, guess, straight = s.dt, w.x.u, w.x.guess, w.x.straight
     base, speed, rest, constrained = w.x.base, w.x.speed, w.x.rest, w.x.constrained
     u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
@@ -347,10 +347,10 @@ def _correct(e, matrices, rule, s, w, state, anew):
 
 @apart("motion", *ALL, float, float, returns=int)
 def _judged(e, matrices, rule, s, w, state, reference, noise):
-    """Update the independent stresses and decide what to do after the correction. If old factors
-    rotate with respect to a stiff, slender beam, they take axial stretch for bending, and Newton's
-    iteration needs new ones all the time. Independent stresses, ``S = D (eps(u) + B(origin) du)``,
-    have an error of the rotation only, whatever D is."""
+    """Update the independent stresses and decide what to do after the correction."""
+    # If old factors rotate with respect to a stiff, slender beam, they take axial stretch for
+    # bending, and Newton's iteration needs new ones all the time. Independent stresses, ``S = D
+    # (eps(u) + B(origin) du)``, have an error of the rotation only, whatever D is.
     du, scratch = w.x.du, w.x.scratch
     if state.mixed_steps[0] > 0:
         for i in indices(du.size):

@@ -53,9 +53,10 @@ def to_damping_velocity(free, rule, s, w):
 
 @apart("motion", *ALL)
 def internal_force(e, matrices, rule, s, w, state):
-    """The internal force of the iterate without damping. In the mixed iteration with independent
-    stresses S, the residual of ``S = D eps(u)`` acts in the directions of the factors: ``f = B(u)^T
-    S + B(origin)^T (D eps(u) - S)``, and likewise for viscous stresses."""
+    """The internal force of the iterate without damping."""
+    # In the mixed iteration with independent stresses S, the residual of ``S = D eps(u)`` acts in
+    # the directions of the factors: ``f = B(u)^T S + B(origin)^T (D eps(u) - S)``, and likewise for
+    # viscous stresses.
     u0, u, f, S = w.y[0], w.x.u, w.x.force, w.stresses
     missing, independent, constitutive, slow, rates = S[2], S[3], S[4], S[5], S[6]
     if state.mixed_steps[0] > 0:
@@ -235,10 +236,11 @@ def factorize_tangent(e, matrices, rule, s, w, state):
 
 @apart("unsymmetric", *ALL)
 def _unsymmetric_tangent(e, matrices, rule, s, w, state):
-    """Set U, the iteration matrix with the strain derivatives at the end of the step. A mean force
-    ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. A has B(u_m) instead of B(u_1). They
-    differ if more strains are sampled than the stretch of a straight axis can satisfy, as in cables
-    of degree 5 and above: then the iteration with A converges slowly or not at all."""
+    """Set U, the iteration matrix with the strain derivatives at the end of the step."""
+    # A mean force ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. A has B(u_m) instead of
+    # B(u_1). They differ if more strains are sampled than the stretch of a straight axis can
+    # satisfy, as in cables of degree 5 and above: then the iteration with A converges slowly or not
+    # at all.
     U = matrices.U
     copy(w.x.u, w.x.ahead)
     clear(U.flat)

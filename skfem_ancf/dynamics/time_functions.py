@@ -43,8 +43,8 @@ def rate_weights(at: Array, samples: Array) -> Array:
 
 def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
           limit: float) -> Array:
-    """First and second rate, (2, k), of a function of time at the start or the end t of a step. If
-    ``ahead``, the step begins at t, else it ends there; no sample lies beyond ``limit``."""
+    """First and second rate, (2, k), of a function of time at the start or the end t of a step."""
+    # If ``ahead``, the step begins at t, else it ends there; no sample lies beyond ``limit``.
     values = function(np.minimum((t if ahead else t - dt) + dt * SAMPLES, limit))
     first, second = rate_weights(np.array([0.0 if ahead else 1.0]), SAMPLES)[:, 0]
     return np.array([first / dt @ values, second / dt**2 @ values])
@@ -61,9 +61,9 @@ class TimeFunctions:
 
     def of(self, start: float, dt: float, steps: tuple[int, int], limit: float,
            block: tuple[int, int] | None = None) -> TimeValues:
-        """Values and rates in the steps ``range(*steps)``; step 0 begins at ``start``. A whole
-        ``block`` of steps is sampled in one call, so that the result does not depend on ``steps``.
-        No sample lies beyond the time ``limit``."""
+        """Values and rates in the steps ``range(*steps)``; step 0 begins at ``start``."""
+        # A whole ``block`` of steps is sampled in one call, so that the result does not depend on
+        # ``steps``. No sample lies beyond the time ``limit``.
         first, last = block = block or steps
         key = start, dt, first, last, limit
         if self._block is None or self._block[0] != key:

@@ -152,9 +152,9 @@ class Backend:
                 sum(len(group.first) for _, group in system.forces.contacts.groups))
 
     def of(self, kernel: Callable, iterations: float = 1.0, calls: bool = False) -> Callable:
-        """A kernel bound to the equations, its first argument, in NumPy or compiled. ``iterations``
-        are those of the work that is done with it. With ``calls`` it calls Python. NumPy may warn
-        of overflow."""
+        """A kernel bound to the equations, its first argument, in NumPy or compiled."""
+        # ``iterations`` are those of the work that is done with it. With ``calls`` it calls Python.
+        # NumPy may warn of overflow.
         global _worked
         way, name = self.choose(kernel.__name__, iterations).way, kernel.__name__
         if way == "plain":
@@ -190,8 +190,8 @@ class Backend:
         return checked
 
     def _loaded(self, kernel, args, calls):
-        """A kernel as the first call needs it: compiled, or in NumPy if that is impossible. It
-        announces long compilations."""
+        """A kernel as the first call needs it: compiled, or in NumPy if that is impossible."""
+        # It announces long compilations.
         global _worked
         name = kernel.__name__
         if PROBLEMS or self._plain is not None:  # found since it was chosen
@@ -262,8 +262,8 @@ _announced = False
 
 @contextmanager
 def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
-    """Announce on stderr what is compiled and for how long, with progress; not for cached names.
-    Yields a function that takes the name of a finished part."""
+    """Announce on stderr what is compiled and for how long, with progress; not for cached names."""
+    # Yields a function that takes the name of a finished part.
     global _announced
     names = {name for name in names if not code_cache.on_disk(name)}
     if not names or _announced:

@@ -223,9 +223,9 @@ class CondensedMass:
 
     def solve(self, u: Array, t: float, b: Array, rate: Array, forces: Any = None,
               scale: float = 0.0, most: int = REFINEMENTS) -> tuple[Array, Array]:
-        """Solve ``M x + J^T l = b``, ``J1 x = rate`` for x (N,) and l (m,). J1 is the joint
-        Jacobian at u (N,) and t; J is ``forces``, sparse (m, N), or J1. ``scale`` is a norm of x to
-        which the accuracy is relative, ``most`` the number of refinements."""
+        """Solve ``M x + J^T l = b``, ``J1 x = rate`` for x (N,) and l (m,)."""
+        # J1 is the joint Jacobian at u (N,) and t; J is ``forces``, sparse (m, N), or J1. ``scale``
+        # is a norm of x to which the accuracy is relative, ``most`` the number of refinements.
         J1 = self._condensed.nodes.derivative(u, t)
         J = (J1 if forces is None else forces).T
         # another iterate at this instant starts from the last solution
@@ -263,10 +263,10 @@ class CondensedMass:
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                    dm: Array) -> bool:
-        """Project velocities or accelerations R (N,) onto the joints at u and t. ``phi`` (m,) is
-        the required change of J R. ``du`` is the displacement of the joint forces on entry; the
-        change is returned in du (N,) and dm (m,). With empty ``multipliers`` a few refinements
-        suffice, since more iterations follow."""
+        """Project velocities or accelerations R (N,) onto the joints at u and t."""
+        # ``phi`` (m,) is the required change of J R. ``du`` is the displacement of the joint forces
+        # on entry; the change is returned in du (N,) and dm (m,). With empty ``multipliers`` a few
+        # refinements suffice, since more iterations follow.
         try:
             J = None
             if self.lag or not np.array_equal(du, u):
@@ -313,8 +313,8 @@ class _Moves:
         return (np.conj(turns[self._turned]) * turns[self._leading]).real
 
     def __call__(self, turns: Array, scales: Array) -> sparse.csr_array:
-        """Matrix from residuals (m,) to end displacements (3 ends,). Its transpose maps negative
-        end forces to multipliers."""
+        """Matrix from residuals (m,) to end displacements (3 ends,)."""
+        # Its transpose maps negative end forces to multipliers.
         values = np.ones(len(self._at[0]))
         values[:self._following] = -1.0
         values[self._following - len(scales):self._following] /= scales

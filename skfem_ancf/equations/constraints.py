@@ -355,8 +355,8 @@ class Constraints:
 
     def joint_force(self, joint: BoundConstraint, multipliers: Array, reaction: Array, u: Array,
                     t: float) -> Array:
-        """Force of a joint on its first beam, one number for each of ``joint.equations``.
-        ``reaction`` (N,) are the forces of the supports."""
+        """Force of a joint on its first beam, one number for each of ``joint.equations``."""
+        # ``reaction`` (N,) are the forces of the supports.
         if len(self._left_out):
             whole = self._whole
             sizes = whole.equation_sizes(*whole.slopes)

@@ -114,8 +114,9 @@ GO_ON, DONE, RESTART, FAILED = range(4)
 
 @source
 def judge(state, tol, reference, noise, reused):
-    """What to do after a correction of a time step, by its size and contraction. ``state`` is the
-    StepState, ``reused`` the largest contraction with which factors are used again."""
+    """What to do after a correction of a time step, by its size and contraction."""
+    # ``state`` is the StepState, ``reused`` the largest contraction with which factors are used
+    # again.
     size, before = state.correction[0], state.last_correction[0]
     if not size < 1e300:
         state.failure[0] = NOT_FINITE
@@ -153,7 +154,7 @@ def judged(state, tol, reference, noise, reused, mixed, later):
 
 @source
 def noise_of_step(rule, stiffness_factor, mass_factor, inertia):
-    """The round-off of a correction, from that of the strains and of the mass. ``inertia`` is the
-    mass times squared displacements."""
+    """The round-off of a correction, from that of the strains and of the mass."""
+    # ``inertia`` is the mass times squared displacements.
     return np.sqrt(rule.noise**2 * stiffness_factor
                    + EPS * EPS * mass_factor * (inertia + rule.inertia))

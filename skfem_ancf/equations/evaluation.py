@@ -37,9 +37,9 @@ def viscous_force(e, u, v, f):
 
 @apart("statics", Equations, F1, F1, float, float, float, bool, F1, F1, F1)
 def tangent(e, u, factors, t, scale, at, use_independent, stresses, independent, f):
-    """Set internal force, stresses, and the tangent of the residual, in ``e.K``. The geometric part
-    uses the independent stresses if ``use_independent``. ``factors``, ``t`` and ``scale`` are as
-    for :func:`~skfem_ancf.actions.tables.external_force`."""
+    """Set internal force, stresses, and the tangent of the residual, in ``e.K``."""
+    # The geometric part uses the independent stresses if ``use_independent``. ``factors``, ``t``
+    # and ``scale`` are as for :func:`~skfem_ancf.actions.tables.external_force`.
     body_tangent(e.body, u, f, independent, use_independent, stresses, e.K)
     add_elastic_force(e.forces, at, 0.0, u, u, f)
     add_load_stiffness(e.loads, factors, t, scale, u, e.K)
@@ -75,12 +75,13 @@ SMALLEST = 1e-14
 
 @apart("statics", Equations, Annotated[Target, MADE], F2, int, bool, F1, F2, F2, F2, F1)
 def balance(e, target, factors, which, mixed, g, x, m, stresses, norms):
-    """Set forces, residual, tangent and its inverse diagonal. ``which`` is AT_START for the first
-    tangent, AT_END for the last residual, without a tangent. ``factors`` are load factors and those
-    for the first tangent; ``m`` the multipliers and residuals of joints, and in row 3 their c;
-    ``stresses`` those of the strain and the independent ones. If ``mixed``, the geometric part uses
-    the last stresses, linearised along the correction. ``norms`` gets those of residual and larger
-    force, and the largest relative residual of joints."""
+    """Set forces, residual, tangent and its inverse diagonal."""
+    # ``which`` is AT_START for the first tangent, AT_END for the last residual, without a tangent.
+    # ``factors`` are load factors and those for the first tangent; ``m`` the multipliers and
+    # residuals of joints, and in row 3 their c; ``stresses`` those of the strain and the
+    # independent ones. If ``mixed``, the geometric part uses the last stresses, linearised along
+    # the correction. ``norms`` gets those of residual and larger force, and the largest relative
+    # residual of joints.
     u, f, load, R, weights, phi = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS], m[1]
     gap, drag, opened = x[GAP], x[DRAG], 0.0
     if e.lasting >= MATERIALS:
@@ -173,10 +174,11 @@ LEFT, TRIES, PARTS = 0.5, 12, 16
 
 @apart("contacts", Equations, float, float, F1, F1, F1, F1)
 def hold_back(e, t, loose, u, R, du, dm):
-    """Line search for a correction that runs into obstacles; scales du and dm. If ``loose`` is 1,
-    bodies move by no more than an interval, as nothing but contact stops them. The residual along
-    the correction, of the equations linearised without contact plus the actual contact forces, has
-    to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close in turn."""
+    """Line search for a correction that runs into obstacles; scales du and dm."""
+    # If ``loose`` is 1, bodies move by no more than an interval, as nothing but contact stops them.
+    # The residual along the correction, of the equations linearised without contact plus the actual
+    # contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close
+    # in turn.
     work, two, scratch, ahead = dot(R, du), np.empty(2), np.zeros(u.size), u.copy()
     add_multiple(1.0, du, ahead)
     if loose == 0.0 and nothing_touches(e.forces, u) and nothing_touches(e.forces, ahead):

@@ -87,8 +87,8 @@ class Histories:
         return self._kernels[id(beam)]
 
     def beam(self, beam: Beam) -> Beam:
-        """A beam with this history, for stress and element forces. It is the beam itself if its
-        laws have no history."""
+        """A beam with this history, for stress and element forces."""
+        # It is the beam itself if its laws have no history.
         past = self.past(beam)
         return beam if past is None else with_history(beam, past.history)
 

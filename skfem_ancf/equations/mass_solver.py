@@ -50,8 +50,8 @@ class MassSolver:
 
     def __call__(self, u: Array, t: float, J: Any = None
                  ) -> Callable[[Array, Array], tuple[Array, Array]]:
-        """A function of b (N,) and rate (m,) that returns x and l, at one displacement and time. J
-        is ``constraints.full_jacobian(u, t)`` if known."""
+        """A function of b (N,) and rate (m,) that returns x and l, at one displacement and time."""
+        # J is ``constraints.full_jacobian(u, t)`` if known.
         if self.by_nodes:
             mass = self._condensed
             mass.forget()

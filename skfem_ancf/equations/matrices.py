@@ -34,9 +34,9 @@ def linear_energy(system: System, base: Array, d: Array, load: float = 1.0) -> f
 
 
 def linear_external_force(system: System, base: Array, d: Array) -> Array:
-    """The linearised force of all loads at full load, shape (N,). About the reference configuration
-    the stiffness of the package's follower loads is neglected, as in linear theory; that of
-    user-defined loads counts."""
+    """The linearised force of all loads at full load, shape (N,)."""
+    # About the reference configuration the stiffness of the package's follower loads is neglected,
+    # as in linear theory; that of user-defined loads counts.
     out, at_rest = np.array(system.external_force(base)), not base.any()
     for one in system.loads:
         s, stiff = system.of(one), not one.constant and not (at_rest and not one.first_order)

@@ -30,10 +30,11 @@ HELD = 1e-3
 
 
 def repeated(constraints: Any) -> tuple[Array | None, bool]:
-    """The redundant equations of joints, and whether they are dependent in this position only. A
-    redundant equation is closed, and a linear combination of others in J at the start and after a
-    small random motion that the joints allow: a linkage in a singular position has such rows at the
-    start only. None involved may depend on time; None for dependent equations of another kind."""
+    """The redundant equations of joints, and whether they are dependent in this position only."""
+    # A redundant equation is closed, and a linear combination of others in J at the start and after
+    # a small random motion that the joints allow: a linkage in a singular position has such rows at
+    # the start only. None involved may depend on time; None for dependent equations of another
+    # kind.
     c, found, passing = constraints, [], False
     start = np.zeros(c.N)
     start[c.fixed] = c.values(1.0)
@@ -75,8 +76,9 @@ def repeated(constraints: Any) -> tuple[Array | None, bool]:
 
 
 def shared(J: sparse.csr_array, multipliers: Array, left: Array, inner: Array) -> Array:
-    """The smallest multipliers (m,) with the same forces as given ones. Multipliers of internal
-    equations (``inner``, bool (m,)) are not minimised; ``left`` are the redundant equations."""
+    """The smallest multipliers (m,) with the same forces as given ones."""
+    # Multipliers of internal equations (``inner``, bool (m,)) are not minimised; ``left`` are the
+    # redundant equations.
     out = multipliers.copy()
     for rows, columns, A in groups(J):
         if np.isin(rows, left).any() and A.size:
@@ -153,9 +155,9 @@ def who(members: Any, k: int) -> str:
 
 def free_rigid_motions(constraints: Any, joints: Any,
                        stiffness: Callable[[], Any] | None) -> list[str]:
-    """Descriptions of the rigid motions that no support, joint or force element constrains.
-    ``joints`` is the Jacobian (m, N) in the reference configuration; ``stiffness`` returns the
-    sparse stiffness of force elements there, or is None."""
+    """Descriptions of the rigid motions that no support, joint or force element constrains."""
+    # ``joints`` is the Jacobian (m, N) in the reference configuration; ``stiffness`` returns the
+    # sparse stiffness of force elements there, or is None.
     c = constraints
     if len(c.members) == 1 and _held(c):
         return []
@@ -185,9 +187,9 @@ def _held(c):
 
 
 def _motions(c, joints):
-    """Rigid motions of the bodies (N, 3 n), J times them, and a function that names the bodies.
-    Bodies are beams, rigid bodies and, in a frame, rigidly connected parts. Each has two
-    translations and a rotation in units of its size. Small matrices are dense."""
+    """Rigid motions of the bodies (N, 3 n), J times them, and a function that names the bodies."""
+    # Bodies are beams, rigid bodies and, in a frame, rigidly connected parts. Each has two
+    # translations and a rotation in units of its size. Small matrices are dense.
     if c.frame is not None:
         frame, origin = c.frame, c.members[0].origin
         parts = frame.parts()

@@ -135,8 +135,8 @@ def is_definite(A: sparse.csr_array) -> bool:
 
 
 def diagonal_factors(A: sparse.csc_array, order: str) -> Any:
-    """Sparse LU of a symmetric matrix with all pivots on the diagonal, or None. ``order`` is a
-    column ordering of :func:`scipy.sparse.linalg.splu`."""
+    """Sparse LU of a symmetric matrix with all pivots on the diagonal, or None."""
+    # ``order`` is a column ordering of :func:`scipy.sparse.linalg.splu`.
     try:
         lu = splu(A, order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError:  # a pivot is zero
@@ -180,8 +180,8 @@ def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
 
 
 def null_space(H: Array | sparse.csr_array) -> Array:
-    """Orthonormal vectors (k, n) of the null space of H (r, n), whose rows have unit size. With
-    more than :data:`DENSE` columns at most :data:`MOST` vectors are found."""
+    """Orthonormal vectors (k, n) of the null space of H (r, n), whose rows have unit size."""
+    # With more than :data:`DENSE` columns at most :data:`MOST` vectors are found.
     n = H.shape[1]
     if not H.shape[0]:
         return np.eye(n)[:n if n <= DENSE else MOST]

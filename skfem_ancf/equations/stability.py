@@ -62,12 +62,13 @@ RUBS = "if points stick where they touch: friction has no potential, flutter is 
 
 def verdict(system: Any, u: Array, load: float, multipliers: Array,
             t: float | None = None) -> Verdict:
-    """The :class:`Verdict` on an equilibrium u (N,) with multipliers (m,). Without a potential, as
-    for a pressure with free edges, the tangent K is unsymmetric. det K < 0 (an odd number of
-    negative eigenvalues) means divergence: unstable. A positive definite symmetric part excludes
-    it. Otherwise an eigenvalue with a negative real part, for equal masses at the nodes, means
-    unstable. All else is undecided, and flutter depends on the mass: see ``scene.modes``. Points
-    that slip on obstacles count as sticking: of a disturbance either way friction resists one."""
+    """The :class:`Verdict` on an equilibrium u (N,) with multipliers (m,)."""
+    # Without a potential, as for a pressure with free edges, the tangent K is unsymmetric. det K <
+    # 0 (an odd number of negative eigenvalues) means divergence: unstable. A positive definite
+    # symmetric part excludes it. Otherwise an eigenvalue with a negative real part, for equal
+    # masses at the nodes, means unstable. All else is undecided, and flutter depends on the mass:
+    # see ``scene.modes``. Points that slip on obstacles count as sticking: of a disturbance either
+    # way friction resists one.
     t = system.clock if t is None else t
     system = system.sticking()
     try:
@@ -90,8 +91,8 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
 
 
 def _diverges(system):
-    """True if a motion grows, by the factors: an eigenvalue has a negative real part. As of equal
-    masses at the nodes."""
+    """True if a motion grows, by the factors: an eigenvalue has a negative real part."""
+    # As of equal masses at the nodes.
     at, inverse = inverse_on_positions(system)
     if len(at) <= DENSE:
         values = np.linalg.eigvals(np.array([inverse(y)[at] for y in np.eye(len(at))]))
@@ -106,8 +107,8 @@ def _diverges(system):
 
 
 def inverse_on_positions(system: Any) -> tuple[Array, Callable[[Array], Array]]:
-    """Free positions of nodes (n,), and a function of forces there (n,): the displacement (N,). By
-    the factors of the tangent."""
+    """Free positions of nodes (n,), and a function of forces there (n,): the displacement (N,)."""
+    # By the factors of the tangent.
     at = np.nonzero((position_weights(system) > 0) & system.constraints.free)[0]
     none = np.zeros(system.constraints.m)
 
@@ -127,9 +128,9 @@ def _is_symmetric(system):
 
 def response(system: Any, u: Array, load: float, when: float, multipliers: Array,
              t: float | None = None) -> Callable[[Array], Any]:
-    """A function of forces (N,): displacements (N,) by the tangent at u (N,). With a measure of
-    displacements; None if there is no tangent. ``when`` is the time of joints, ``t`` that of loads,
-    None for full size."""
+    """A function of forces (N,): displacements (N,) by the tangent at u (N,)."""
+    # With a measure of displacements; None if there is no tangent. ``when`` is the time of joints,
+    # ``t`` that of loads, None for full size.
     none = np.zeros(system.constraints.m)
     try:
         system.assemble(u, load, t=t)
@@ -150,8 +151,8 @@ def has_potential(system: Any, u: Array, load: float) -> bool:
 
 
 def not_unstable(system: Any, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
-    """True unless the equilibrium that an iteration just found is unstable. The last factors
-    usually decide; otherwise the tangent is factorised at the solution."""
+    """True unless the equilibrium that an iteration just found is unstable."""
+    # The last factors usually decide; otherwise the tangent is factorised at the solution.
     try:
         if system.solver.stays():
             return True
@@ -161,8 +162,8 @@ def not_unstable(system: Any, u: Array, load: float, multipliers: Array, t: floa
 
 
 def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
-    """True if loads or obstacles stabilise a scene with unconstrained rigid motions. The tangent at
-    u (N,) must be positive definite beyond round-off."""
+    """True if loads or obstacles stabilise a scene with unconstrained rigid motions."""
+    # The tangent at u (N,) must be positive definite beyond round-off.
     system = system.sticking()
     force, _ = system.assemble(u)
     fix(system.K, system.constraints.fixed)

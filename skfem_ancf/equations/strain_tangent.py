@@ -108,10 +108,10 @@ class StrainTangent:
         return du, self.stresses(du), multipliers[:, 0]
 
     def balance(self, M: csr_matrix, shift: float) -> None:
-        """Replace the stress by one in equilibrium, if the state is an equilibrium to round-off.
-        The axial stress of a slender beam has the round-off of the strain times E. The correction
-        of the displacement is negligible, that of the stress is not. ``K + shift M`` must be
-        invertible."""
+        """Replace the stress by one in equilibrium, if the state is an equilibrium to round-off."""
+        # The axial stress of a slender beam has the round-off of the strain times E. The correction
+        # of the displacement is negligible, that of the stress is not. ``K + shift M`` must be
+        # invertible.
         u, load, t, _ = self._at
         rest = (load * self.system.external_force(u, t)[self.free] - self.B.T @ self.stress
                 - self.J.T @ self.multipliers - self._element_force())
@@ -292,8 +292,8 @@ class Inverse:
 
     def solve_both(self, b: Array, c: Array | None = None,
                    accepted: float = ACCEPTED) -> tuple[Array, Array]:
-        """x (n, k) and l (m, k) for columns b and ``J x = c``, 0 by default. ``accepted`` is the
-        largest accepted correction relative to x, in the energy norm."""
+        """x (n, k) and l (m, k) for columns b and ``J x = c``, 0 by default."""
+        # ``accepted`` is the largest accepted correction relative to x, in the energy norm.
         c = np.zeros((self._tangent.size[1], b.shape[1])) if c is None else c
         x, l, good = self._refined(b, c, accepted)
         if not good and not self._by_strains:

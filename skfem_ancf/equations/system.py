@@ -70,9 +70,9 @@ class Scales:
 
     @cached_property
     def work_noise(self) -> float:
-        """Root of the work of a correction that is round-off. The round-off of displacements is eps
-        times the size of the scene, that of their gradients is larger by one over the length of an
-        element."""
+        """Root of the work of a correction that is round-off."""
+        # The round-off of displacements is eps times the size of the scene, that of their gradients
+        # is larger by one over the length of an element.
         s = self._system
         if not s.beams and not s.domains:
             return self.strain_noise
@@ -88,8 +88,8 @@ class Scales:
 
     @cached_property
     def bending_eigenvalue(self) -> float:
-        """omega^2 of the slowest bending of a beam as long as the scene, about. For rigid bodies,
-        that of their total mass on one spring of the scene's stiffness."""
+        """omega^2 of the slowest bending of a beam as long as the scene, about."""
+        # For rigid bodies, that of their total mass on one spring of the scene's stiffness.
         s = self._system
         if not s.beams:
             mass = sum(body.total_mass for body in s.members)
@@ -279,8 +279,9 @@ class System:
 
     def load_potential(self, u: Array, t: float | None = None,
                        turned: Array | None = None) -> float:
-        """Potential of the loads; loads without a potential count as zero. ``turned`` (k,) are the
-        rotations of the sections of moments, with whole turns; by default those of u."""
+        """Potential of the loads; loads without a potential count as zero."""
+        # ``turned`` (k,) are the rotations of the sections of moments, with whole turns; by default
+        # those of u.
         t, total, number = self.clock if t is None else t, 0.0, count()
         for load in self.loads:
             factor, acting = load.acting(t)
@@ -311,8 +312,8 @@ class System:
         return self._force(evaluation.mean_force, u0, u1, at=self._time(1.0, t))
 
     def accept(self, u0: Array, u: Array, load: float, t: float) -> tuple[Array | None, float]:
-        """The history after an increment in statics from u0 to u, and what it dissipates. ``t`` is
-        the time of obstacles and items."""
+        """The history after an increment in statics from u0 to u, and what it dissipates."""
+        # ``t`` is the time of obstacles and items.
         self._carry(None, load)
         return self.histories.accept(u0, u, t)
 

@@ -85,8 +85,8 @@ class UserDefined:
             out[s] += factor * force
 
     def subtract_custom_stiffness(self, t: float, scale: float, u: Array, flat: Array) -> None:
-        """Subtract the derivative of :meth:`add_custom_force` from the entries (n,) of a band. An
-        infinite time stands for linear theory, in which the package's loads have no stiffness."""
+        """Subtract the derivative of :meth:`add_custom_force` from the entries (n,) of a band."""
+        # An infinite time stands for linear theory, in which the package's loads have no stiffness.
         system = self._system
         for load in self._loads:
             if np.isinf(t) and not load.first_order:
@@ -99,10 +99,11 @@ class UserDefined:
             np.add.at(flat, at[keep], -scale * factor * v[keep])
 
     def add_custom_joints(self, what: int, t: float, u: Array, v: Array, out: Array) -> None:
-        """Evaluate joints. ``what`` is 0: Phi, 1: J v, 2: J^T v with v (m,), 3: J, 4: v^T Phi'' v.
-        For the energy-momentum scheme, 5: the discrete gradient from v to u, 6: the force of
-        impulses, with u at the end of the step and v = (v0, v1, u0, impulses). 7 and 8 are 0 and 1
-        of the joints that depend on time, with zeros for the others."""
+        """Evaluate joints."""
+        # ``what`` is 0: Phi, 1: J v, 2: J^T v with v (m,), 3: J, 4: v^T Phi'' v. For the
+        # energy-momentum scheme, 5: the discrete gradient from v to u, 6: the force of impulses,
+        # with u at the end of the step and v = (v0, v1, u0, impulses). 7 and 8 are 0 and 1 of the
+        # joints that depend on time, with zeros for the others.
         c, N = self._system.constraints, self._system.N
         if what == 0:
             out[:] = c.constraint(u, t)
@@ -219,9 +220,10 @@ class Tables:
         return tables
 
     def _axes(self, body):
-        """The Axes. Stresses are strains times moduli in linear laws without coupling; of cables
-        half the length, or half the curvature of a radius of half the height, are far from
-        sections that overlap."""
+        """The Axes."""
+        # Stresses are strains times moduli in linear laws without coupling; of cables half the
+        # length, or half the curvature of a radius of half the height, are far from sections that
+        # overlap.
         beams, nodes, rest, limits = self.system.beams, [_NO_NODES], [np.zeros((8, 0))], []
         for beam, s in zip(beams, self.system.slices):
             axis = beam.q0_local.view(complex).reshape(-1, beam.nd // 2)[:, :2]
@@ -355,8 +357,8 @@ class Tables:
         return any(load.prestress for load in [*self._loads[2], *self._loads[3]])
 
     def static_factors(self, scale: float, before: float | None = None) -> Array:
-        """Load factors (k,) in statics at the load factor ``scale``. ``before`` is the load factor
-        of the initial state, for prestress in the first tangent."""
+        """Load factors (k,) in statics at the load factor ``scale``."""
+        # ``before`` is the load factor of the initial state, for prestress in the first tangent.
         out = scale * self._at_rest
         if before is None or not self.prestressed:
             return out

@@ -163,8 +163,8 @@ class ElasticPlastic(HistoryMaterial):
         return steps[k] + (p - h[k, 0]) * (0.5 * (h[k, 1] + end) - self.yield_stress)
 
     def _returned(self, gap, start, most):
-        """Zeros (n,) of decreasing functions ``gap(g) -> value, slope`` with gap(0) > 0. Newton's
-        method, after :data:`FEW` corrections within bounds; ``most`` (n,) is one."""
+        """Zeros (n,) of decreasing functions ``gap(g) -> value, slope`` with gap(0) > 0."""
+        # Newton's method, after :data:`FEW` corrections within bounds; ``most`` (n,) is one.
         low, high, g, closed = 0.0 * most, most, start, CLOSED * self.yield_stress
         for k in range(CORRECTIONS):
             value, slope = gap(g)

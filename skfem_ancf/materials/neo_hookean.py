@@ -43,9 +43,9 @@ def log_determinant(xx, yy, xy):
 
 @source
 def neo_hookean(constants, xx, yy, xy):
-    """W = G/2 (tr C - 3) - G ln J + lambda/2 (ln J)^2 and its derivatives. S = G (I - C^-1) +
-    lambda ln J C^-1; the moduli are condensed with S_33 = 0 in plane stress. Arguments are those of
-    :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial`."""
+    """W = G/2 (tr C - 3) - G ln J + lambda/2 (ln J)^2 and its derivatives."""
+    # S = G (I - C^-1) + lambda ln J C^-1; the moduli are condensed with S_33 = 0 in plane stress.
+    # Arguments are those of :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial`.
     G, lame, plane_stress = constants[0], constants[1], constants[2]
     log_det = log_determinant(xx, yy, xy)
     x = log_thickness(G, lame, log_det) if plane_stress > 0.0 else 0.0 * log_det

@@ -15,10 +15,11 @@ THICKNESS = 1e4
 
 @source
 def plane_sections(constants, xx, yy, xy):
-    """W = E/2 (a - 1)^2 + G/2 g^2 + K/2 eps_yy^2 and its derivatives. With the axial derivative f
-    of the position and the unit vector n along the section, a is the part of f normal to n, and g =
-    f . n. In terms of the strain g^2 = (2 eps_xy)^2 / C_22 and a^2 = C_11 - g^2. Arguments are
-    those of :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial`."""
+    """W = E/2 (a - 1)^2 + G/2 g^2 + K/2 eps_yy^2 and its derivatives."""
+    # With the axial derivative f of the position and the unit vector n along the section, a is the
+    # part of f normal to n, and g = f . n. In terms of the strain g^2 = (2 eps_xy)^2 / C_22 and a^2
+    # = C_11 - g^2. Arguments are those of
+    # :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial`.
     E, G, K = constants[0], constants[1], constants[2]
     across = 1.0 / (1.0 + 2.0 * yy)
     slide = across * xy  # half the derivative of g^2 by 2 eps_xy

@@ -81,10 +81,10 @@ def turned(d: Array) -> Array:
 
 
 def nodal_derivatives(mesh: Any, most: int) -> list[Array]:
-    """Position of the axis at the nodes, and ``most`` derivatives by arc length, all (2, n).
-    Position, tangent and curvature are those of the mesh. Higher derivatives are those of the
-    polynomial of degree 8 through these at the node and its two neighbours, with a position error
-    of order 9."""
+    """Position of the axis at the nodes, and ``most`` derivatives by arc length, all (2, n)."""
+    # Position, tangent and curvature are those of the mesh. Higher derivatives are those of the
+    # polynomial of degree 8 through these at the node and its two neighbours, with a position error
+    # of order 9.
     known = [mesh.p, mesh.p_X]
     if most > 1 and mesh.p_XY is not None:
         known.append(-turned(mesh.p_XY))

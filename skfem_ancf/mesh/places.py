@@ -300,11 +300,11 @@ def on_other_mesh(place: object) -> bool:
 
 
 def facets_of(mesh: Any, place: Place) -> Array:
-    """Numbers of the facets of a mesh at a place, (n,), n >= 1; or NameUnknown, MeshError. A place
-    is the name of a boundary; two floats, a material point on the section of a node; a function of
-    points (2, n) that returns n truth values, for the facets whose midpoints satisfy it; numbers of
-    facets in an array of integers; a tuple, list or set of places, or an array (n, 2) of points. A
-    scikit-fem ``OrientedBoundary`` is returned as it is."""
+    """Numbers of the facets of a mesh at a place, (n,), n >= 1; or NameUnknown, MeshError."""
+    # A place is the name of a boundary; two floats, a material point on the section of a node; a
+    # function of points (2, n) that returns n truth values, for the facets whose midpoints satisfy
+    # it; numbers of facets in an array of integers; a tuple, list or set of places, or an array (n,
+    # 2) of points. A scikit-fem ``OrientedBoundary`` is returned as it is.
     if is_masked(place):
         raise InputError(f"a place must not have masked values, got {shown(place)}")
     place = points_of_rows(place)

@@ -49,8 +49,9 @@ class Grid(NamedTuple):
 
 def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
           recover: bool = True) -> list[Grid]:
-    """The :class:`Grid` of each beam, rigid body and domain of a state. ``subdivide`` is the number
-    of quads along and across an element; with ``lagrange`` an element is one Lagrange cell."""
+    """The :class:`Grid` of each beam, rigid body and domain of a state."""
+    # ``subdivide`` is the number of quads along and across an element; with ``lagrange`` an element
+    # is one Lagrange cell.
     require_like("state", state, "State", "beams", "u_of")
     try:
         m, n = (require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in subdivide)
@@ -169,9 +170,10 @@ class Body(NamedTuple):
 
 def body_of(grid: Grid, fields: Sequence[Field], undeformed: bool = False, lenient: bool = False,
             share: bool = True) -> Body:
-    """The points, cells and arrays of a grid; undefined values are NaN. ``lenient``: so are fields
-    that a material does not define, instead of an InputError. ``share``: neighbouring elements
-    share points where the displacement and all fields are continuous."""
+    """The points, cells and arrays of a grid; undefined values are NaN."""
+    # ``lenient``: so are fields that a material does not define, instead of an InputError.
+    # ``share``: neighbouring elements share points where the displacement and all fields are
+    # continuous.
     points, cells = grid.points(undeformed), grid.cells
     data = {field.name: _array(field, grid, lenient) for field in fields}
     a, b = grid.between

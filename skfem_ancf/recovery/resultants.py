@@ -138,10 +138,10 @@ def over_time(instants: list[Resultants]) -> Resultants:
 def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
                eigen: Sequence[tuple[Any, Any]] = (), at: tuple[Array, Array] | None = None,
                chain: int | None = None, sections: int = ALONG_ELEMENT) -> Resultants:
-    """The Resultants of a beam for a displacement ``u`` (N,) or a complex step. They follow from
-    the recovery, or from the stress of the elements; ``eigen`` are factors and loads of
-    eigenstrains. Sections are elements and xi ``at``, or all of the beam or one chain, ``sections``
-    in each element."""
+    """The Resultants of a beam for a displacement ``u`` (N,) or a complex step."""
+    # They follow from the recovery, or from the stress of the elements; ``eigen`` are factors and
+    # loads of eigenstrains. Sections are elements and xi ``at``, or all of the beam or one chain,
+    # ``sections`` in each element.
     if at is None:
         e, xi, after = _everywhere(beam, [] if recovery is None else recovery.forces.cuts, sections)
         if chain is not None:

@@ -53,20 +53,17 @@ class Refinement:
 
 def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_degree: int,
                    find: Callable[..., StaticResult]) -> State:
-    """Solve with higher degrees or on finer meshes until the estimated error is small enough.
-
-    With the goal "displacement" each round solves twice. The second solution has the next degree
-    (:meth:`~skfem_ancf.elements.ElementBeam.raised`) for beams whose error decreased at least
-    tenfold with each degree so far (smooth solutions), and halved elements for the others. The
-    difference is the estimate: of the displacement of the beams' ends relative to the size of the
-    scene, and of the strain energy, relative. For the next round smooth beams take the higher
-    degree (Melenk, Wohlmuth: "On residual-based a posteriori error estimation in hp-FEM", Advances
-    in Computational Mathematics 15 (2001)); in the others the elements are halved that contribute
-    most. Beams on a curve are always halved, as a higher degree does not improve their geometry.
-
-    With the goal "strain" the estimate is the difference of the elements' strain and the recovered
-    one in the L2 norm, relative, and the elements that contribute most are halved.
-    """
+    """Solve with higher degrees or on finer meshes until the estimated error is small enough."""
+    # With the goal "displacement" each round solves twice. The second solution has the next degree
+    # (:meth:`~skfem_ancf.elements.ElementBeam.raised`) for beams whose error decreased at least
+    # tenfold with each degree so far (smooth solutions), and halved elements for the others. The
+    # difference is the estimate: of the displacement of the beams' ends relative to the size of the
+    # scene, and of the strain energy, relative. For the next round smooth beams take the higher
+    # degree (Melenk, Wohlmuth: "On residual-based a posteriori error estimation in hp-FEM",
+    # Advances in Computational Mathematics 15 (2001)); in the others the elements are halved that
+    # contribute most. Beams on a curve are always halved, as a higher degree does not improve their
+    # geometry. With the goal "strain" the estimate is the difference of the elements' strain and
+    # the recovered one in the L2 norm, relative, and the elements that contribute most are halved.
     tol = require_positive("adapt", tol)
     max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
     max_degree = require_integer("max_degree", max_degree, 1, DEGREES[-1])
@@ -170,12 +167,12 @@ def _changed(scene, marked, elements):
 
 
 def frequency_errors(scene: Any, modes: Modes) -> Array:
-    """Relative errors (k,) of frequencies at rest by the mesh of the beams; NaN if not known. They
-    are the change as all elements are halved, times 4/3: the sum of all further changes for
-    elements of second order, a quarter too large for those of fourth order. The shapes are improved
-    on the halved elements by two steps of subspace iteration (Xu, Zhou: "A two-grid discretization
-    scheme for eigenvalue problems", Mathematics of Computation 70 (2001)). A ModelWarning says
-    where errors are large."""
+    """Relative errors (k,) of frequencies at rest by the mesh of the beams; NaN if not known."""
+    # They are the change as all elements are halved, times 4/3: the sum of all further changes for
+    # elements of second order, a quarter too large for those of fourth order. The shapes are
+    # improved on the halved elements by two steps of subspace iteration (Xu, Zhou: "A two-grid
+    # discretization scheme for eigenvalue problems", Mathematics of Computation 70 (2001)). A
+    # ModelWarning says where errors are large.
     nothing = np.full(len(modes.frequencies), np.nan)
     if scene.layout.N > MOST_HALVED or not scene.beams or np.iscomplexobj(modes.shapes):
         return nothing
@@ -274,9 +271,10 @@ def _prolonged(beam, halving, u):
 
 
 def _mark(coarse, state, fine, better, split):
-    """Elements of the coarse mesh with most of the difference in the energy norm. Only beams that
-    are ``split``, whose elements the fine mesh has halved, have any. Where the loads of both meshes
-    differ, as those that jump within an element, the work of their difference is included."""
+    """Elements of the coarse mesh with most of the difference in the energy norm."""
+    # Only beams that are ``split``, whose elements the fine mesh has halved, have any. Where the
+    # loads of both meshes differ, as those that jump within an element, the work of their
+    # difference is included.
     before, after = coarse.system.external_force(state.u), fine.system.external_force(better.u)
     errors = []
     for a, b, s in zip(coarse.beams, fine.beams, split):

@@ -233,8 +233,9 @@ class Design:
         return out[:first]
 
     def _by_solution(self, scene, state, P):
-        """The part of the derivatives by displacements and multipliers, (r, n). Sensors and
-        eigenvalues by the adjoint; functions by differences along the changes of the solution."""
+        """The part of the derivatives by displacements and multipliers, (r, n)."""
+        # Sensors and eigenvalues by the adjoint; functions by differences along the changes of the
+        # solution.
         by_state = np.zeros((len(self._values), P.shape[0]))
         at, functions, eigenvalues = 0, [], iter(self._frozen)
         for one, size in zip(self._sensors(scene), self._counts):
@@ -285,8 +286,8 @@ class Design:
         return np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
 
     def _equations(self, p, state):
-        """The equations at the displacements and multipliers of a state, and the readings. An
-        eigenvalue has rows whose sum it is."""
+        """The equations at the displacements and multipliers of a state, and the readings."""
+        # An eigenvalue has rows whose sum it is.
         scene = self._scene(p)
         system, old = scene.system, self._built.system
         refuse(system.N != old.N or system.constraints.m != old.constraints.m, "the parameters "
@@ -414,9 +415,9 @@ def require_smooth(state: State) -> None:
 
 
 def require_regular(state: State, force: Array, soft: Array) -> None:
-    """Raise InputError at a critical point, or where a point just touches an obstacle. ``soft``
-    (N,) is the displacement for any force (N,), at a critical point the mode. There loads take away
-    the stiffness by which elements resist."""
+    """Raise InputError at a critical point, or where a point just touches an obstacle."""
+    # ``soft`` (N,) is the displacement for any force (N,), at a critical point the mode. There
+    # loads take away the stiffness by which elements resist.
     system, u, resists = state.system.after(state.memory), np.array(state.u), 0.0
     for beam in system.beams:
         x, y, kernel = u[system.of(beam)], soft[system.of(beam)], beam.kernel
@@ -450,8 +451,8 @@ def require_regular(state: State, force: Array, soft: Array) -> None:
 
 
 def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
-    """The adjoint (r, N + m) of readings, for products with changes P (N + m, n). Raises InputError
-    if it has no bounds, or depends on the direction."""
+    """The adjoint (r, N + m) of readings, for products with changes P (N + m, n)."""
+    # Raises InputError if it has no bounds, or depends on the direction.
     system = state.system.after(state.memory)
     c, N = system.constraints, system.N
     force = c.free * np.cos(np.arange(N)**2) / c.coordinate_sizes

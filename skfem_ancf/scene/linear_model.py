@@ -264,8 +264,8 @@ class Bordered:
         return np.where(self._free[:, None], u, self._prescribed), multipliers
 
     def adjoint(self, factors: Sequence[float], by: Array) -> Array:
-        """The adjoint (N + m, r) of readings with derivatives ``by`` (N + m, r). At fixed degrees
-        of freedom the equation is that of the prescribed displacement."""
+        """The adjoint (N + m, r) of readings with derivatives ``by`` (N + m, r)."""
+        # At fixed degrees of freedom the equation is that of the prescribed displacement.
         K, solver = self._factors(factors)
         found, N, fixed = solver.solve(by, "T"), len(self._free), ~self._keep
         found[fixed] = (by[:N] - K.T @ found[:N] - self._J.T @ found[N:])[~self._free]

@@ -170,8 +170,8 @@ class Model(NearMisses):
         return value if all(a is b for a, b in zip(inner, value)) else tuple(inner)
 
     def _put(self, *items):
-        """Bind all items before adding them, so that errors leave the scene unchanged. Returns the
-        bound parts."""
+        """Bind all items before adding them, so that errors leave the scene unchanged."""
+        # Returns the bound parts.
         with self._lock:
             entries, fixed = [self._bound(item) for item in items], dict(self._fixed)
             bound = [one for entry in entries for one in entry.bound]

@@ -380,8 +380,8 @@ class _Step:
         return found
 
     def backward(self, bars: dict[str, Array], pull: Array) -> tuple[Array, dict[str, Array]]:
-        """The adjoint of the equations, and derivatives by the instant before. ``bars`` are the
-        derivatives by this instant, ``pull`` (m,) those by the multipliers."""
+        """The adjoint of the equations, and derivatives by the instant before."""
+        # ``bars`` are the derivatives by this instant, ``pull`` (m,) those by the multipliers.
         c, M = self._system.constraints, self._system.mass.multiply
         start = self._before is None
         u, v, a, w = (bars[name] for name in NAMES)
@@ -527,9 +527,9 @@ def _by_columns(design, force, u, t, mean):
 
 
 def _colours(system, u, t, mean):
-    """Rows and columns (k,) of the derivative of a force, colours (N,) of columns, and a step. Mean
-    forces of loads with an energy of their own couple all DOFs of a beam, those of torques both
-    ends; they are no polynomials, nor are those of nonlinear laws."""
+    """Rows and columns (k,) of the derivative of a force, colours (N,) of columns, and a step."""
+    # Mean forces of loads with an energy of their own couple all DOFs of a beam, those of torques
+    # both ends; they are no polynomials, nor are those of nonlinear laws.
     n, elements, own, pairs = len(system.beams), system.forces.elements, [], []
     pattern = [entries_of(s.start + element_dofs(beam)) for beam, s in zip(
         system.beams, system.slices) if mean or system.viscous]

@@ -208,8 +208,8 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         start: State | None = None, sensors: Sequence[tuple[str, Sensor]] = (), *,
         tol: float = 1e-8, max_iterations: int = 30, min_step: float = 1e-4, stable: bool = True,
         progress: bool | None = None) -> StepHistory:
-    """Equilibria over the time of steps, see :meth:`skfem_ancf.Scene.run`. ``sensors`` are names
-    and :class:`~skfem_ancf.dynamics.sensors.Sensor`."""
+    """Equilibria over the time of steps, see :meth:`skfem_ancf.Scene.run`."""
+    # ``sensors`` are names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
     refuse(isinstance(steps, dict), "steps are given by name as Steps(**{!r}), got a dict", steps)
     one = not isinstance(steps, (list, tuple, Steps)) and np.ndim(steps) == 0
     ends = steps.ends if isinstance(steps, Steps) else require_increasing(
@@ -256,9 +256,9 @@ class Instant(NamedTuple):
 
 
 def _begin(system, t, start, u, rules, stable):
-    """The first instant: ``start`` if it belongs to a run of the scene, or computed from it. The
-    residual at its displacement is reduced to zero in load steps. A scene that only loads and
-    obstacles stabilise may be at rest before they act."""
+    """The first instant: ``start`` if it belongs to a run of the scene, or computed from it."""
+    # The residual at its displacement is reduced to zero in load steps. A scene that only loads and
+    # obstacles stabilise may be at rest before they act.
     memory = system.histories.of_state(start)
     motion = None if start is None else start._motion
     if motion is not None and start.system is system and isinstance(start._origin[0], QuasiStatic):
@@ -379,9 +379,9 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
 
 def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticResult,
            options: Options, smallest: bool) -> Instant:
-    """The equilibrium at t of loose members that may touch, with the drag of :func:`drag_of`. First
-    from a guess by the last change. The smallest increment is tried with more drag, with which
-    bodies snap through in several increments."""
+    """The equilibrium at t of loose members that may touch, with the drag of :func:`drag_of`."""
+    # First from a guess by the last change. The smallest increment is tried with more drag, with
+    # which bodies snap through in several increments.
     dt, u = t - last.t, last.result.u
     start.memory = system.histories.after(start.memory).relaxed(u)
     tries: list[Any] = [] if last.velocity is None else [
@@ -401,9 +401,9 @@ def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticRe
 
 
 def drag_of(system: System) -> Array | None:
-    """Drag on each DOF per displacement in an increment, (N,), of loose members that may touch.
-    What no other member touches has no position of its own. With the drag it stays where it was,
-    and what is pushed moves no further than it has to. Other scenes have none."""
+    """Drag on each DOF per displacement in an increment, (N,), of loose members that may touch."""
+    # What no other member touches has no position of its own. With the drag it stays where it was,
+    # and what is pushed moves no further than it has to. Other scenes have none.
     if not (system.constraints.missing_supports and system.forces.changing):
         return None
     out = np.zeros(system.N)

@@ -76,8 +76,8 @@ def configuration(system: System, state: State) -> State:
 
 def solve_static(system: System, u: Array | None, memory: Array | None,
                  find: Callable[..., StaticResult]) -> State:
-    """The equilibrium under full load, without warnings. ``find`` is
-    :func:`skfem_ancf.solvers.solve_static` with its options."""
+    """The equilibrium under full load, without warnings."""
+    # ``find`` is :func:`skfem_ancf.solvers.solve_static` with its options.
     system.constraints.require_independent_joints()
     if system.constraints.adrift:
         system.constraints.require_supports()

@@ -98,11 +98,11 @@ SHEAR_POINTS = 24
 
 
 def shear_factor(layers: Sequence[Layer], order: int) -> float:
-    """Factor on the shear moduli of a section whose shear strain is a polynomial across it. The
-    shear stress in bending is ``b tau = Q S / (E I)`` (Jourawski), with S the E-weighted first
-    moment of the area beyond. Sections of order N >= 1 represent it by polynomials of degree N - 1,
-    the best fit to ``tau / G`` in the energy, and are too stiff by the energy of the remainder. A
-    rectangle has 5/6 for N = 1 and 2, and 1 from N = 3 on."""
+    """Factor on the shear moduli of a section whose shear strain is a polynomial across it."""
+    # The shear stress in bending is ``b tau = Q S / (E I)`` (Jourawski), with S the E-weighted
+    # first moment of the area beyond. Sections of order N >= 1 represent it by polynomials of
+    # degree N - 1, the best fit to ``tau / G`` in the energy, and are too stiff by the energy of
+    # the remainder. A rectangle has 5/6 for N = 1 and 2, and 1 from N = 3 on.
     t, w = gauss(SHEAR_POINTS)
     till = np.array([b * (gauss(SHEAR_POINTS)[1] @ lagrange(t, b * t)) for b in t])
     found, one = [], np.ones(SHEAR_POINTS)

@@ -59,9 +59,9 @@ Shape = tuple[float, float, tuple[tuple[float, ...], ...], tuple[tuple[float, ..
 
 
 def _side(*corners):
-    """A rising line through corners (x, y, radius), from which x = 0 to the last. Rows are the
-    height where a piece begins, and x0, y0, slope and r of ``x = x0 + slope (y - y0) + sign(r)
-    sqrt(r^2 - (y - y0)^2)``."""
+    """A rising line through corners (x, y, radius), from which x = 0 to the last."""
+    # Rows are the height where a piece begins, and x0, y0, slope and r of ``x = x0 + slope (y - y0)
+    # + sign(r) sqrt(r^2 - (y - y0)^2)``.
     points, rows = np.array([corner[:2] for corner in corners]), [(-1.0, 0.0, 0.0, 0.0, 0.0)]
     begin, high = points[0], corners[-1][1]
     for k, (*_, r) in enumerate(corners[1:], 1):

@@ -85,9 +85,9 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
 
 
 def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -> Array:
-    """The required firmness, shape (groups,); at least the present one. ``energy`` is the strain
-    energy including that of the penetration, ``yields`` the result of
-    :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`."""
+    """The required firmness, shape (groups,); at least the present one."""
+    # ``energy`` is the strain energy including that of the penetration, ``yields`` the result of
+    # :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`.
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
@@ -107,11 +107,11 @@ def search_contact(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
                    respond: Callable[..., Any], failed: type[Exception],
                    close: bool = False, dragged: bool = False) -> Any:
-    """An equilibrium in contact at the time t, from a displacement and its time. Obstacles have the
-    contact history at the start of the load step. ``solve`` takes the last equilibrium (None for
-    the start), whether a rough one suffices, and the number of iterations; it raises ``failed``.
-    ``respond`` is that of ``contacts.yielding`` at an equilibrium. If the start is ``close`` to the
-    equilibrium, few iterations are tried."""
+    """An equilibrium in contact at the time t, from a displacement and its time."""
+    # Obstacles have the contact history at the start of the load step. ``solve`` takes the last
+    # equilibrium (None for the start), whether a rough one suffices, and the number of iterations;
+    # it raises ``failed``. ``respond`` is that of ``contacts.yielding`` at an equilibrium. If the
+    # start is ``close`` to the equilibrium, few iterations are tried.
     memory, before = contacts.tables.memory, contacts.tables.memory.copy()
     ramp = StiffnessRamp(contacts, start, t, solve, energy, respond, failed)
 
@@ -167,8 +167,8 @@ class StiffnessRamp:
         self.solve, self.energy, self.failed = solve, energy, failed
 
     def climb(self, found: Any, rough: bool) -> Any:
-        """The equilibrium on stiff obstacles, or the last one before a failure. ``rough``:
-        ``found`` is one that is only a start."""
+        """The equilibrium on stiff obstacles, or the last one before a failure."""
+        # ``rough``: ``found`` is one that is only a start.
         contacts = self.contacts
         for _ in range(0 if contacts.untouched(found[0]) else TIMES):
             u, yields = found[0], np.zeros(len(contacts.groups))

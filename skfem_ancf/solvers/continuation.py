@@ -269,8 +269,8 @@ class Tracer:
 
     def correct(self, start: Point, first: tuple[Any, Any, Any], increment: Callable[..., float],
                 ds: float) -> Point:
-        """Iterate from ``start`` and first increments of u, multipliers and load. ``increment``
-        gives the next one of the load."""
+        """Iterate from ``start`` and first increments of u, multipliers and load."""
+        # ``increment`` gives the next one of the load.
         system, weights = self.system, self.weights
         u, m, load = start.u, start.multipliers, start.load
         _, stresses = system.assemble(u, load)
@@ -441,8 +441,8 @@ def _bifurcation(tracer, p, a, b, tol):
 
 
 def _smallest(tracer, point, start=None):
-    """The eigenvalue closest to zero of the tangent stiffness over its diagonal, and its vector. By
-    the inverse power method from ``start``, a vector (N,) and multipliers (m,)."""
+    """The eigenvalue closest to zero of the tangent stiffness over its diagonal, and its vector."""
+    # By the inverse power method from ``start``, a vector (N,) and multipliers (m,).
     system = tracer.system
     tracer.factorize(point)
     D, none = np.abs(system.K.diagonal()) * system.constraints.mask, np.zeros(system.constraints.m)

@@ -45,9 +45,9 @@ HALVED = 8
 
 
 def heads_on(system: System, start: StaticResult, u: Array, load: float) -> bool:
-    """True if ``u`` lies on the side of the last equilibrium to which the load increment points.
-    Close to a bifurcation an iteration may jump to the other side. The displacement is compared
-    with that of the tangent; moving obstacles are not tested."""
+    """True if ``u`` lies on the side of the last equilibrium to which the load increment points."""
+    # Close to a bifurcation an iteration may jump to the other side. The displacement is compared
+    # with that of the tangent; moving obstacles are not tested.
     if system.forces.contacts.moving:
         return True  # the tangent has no motion of obstacles
     du, constraints, solver = np.zeros(system.N), system.constraints, system.solver
@@ -193,8 +193,8 @@ class Descent:
         return float(a @ (self._weights * b))
 
     def directions(self, count: int) -> list[tuple[Array, float]]:
-        """Directions v with v . K v < 0, and the eigenvalues: pairs, the most negative first. They
-        are eigenvectors of K^-1 on the nodal positions."""
+        """Directions v with v . K v < 0, and the eigenvalues: pairs, the most negative first."""
+        # They are eigenvectors of K^-1 on the nodal positions.
         inverse, values, Y = self._inverse_eigenvectors(count, "SA")
         return [(inverse(y), value) for y, value in zip(Y.T, values) if value < 0]
 
@@ -220,8 +220,8 @@ class Descent:
 
 
 def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
-    """The result of :func:`descend`, or None, and whether an unstable tangent was met. Of all
-    radii, the first result to which the load drives the scene is preferred."""
+    """The result of :func:`descend`, or None, and whether an unstable tangent was met."""
+    # Of all radii, the first result to which the load drives the scene is preferred.
     system, start, level = increment.system, increment.start, increment.level
     options = increment.options._replace(most=DESCENT, watched=False)
     first: tuple[Any, bool] = None, False
@@ -245,9 +245,10 @@ def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
 
 def descend(increment: Any, iterate: Callable[..., Equilibrium],
             descent: Descent) -> Equilibrium:
-    """A stable equilibrium at a load beyond which the path is unstable. Corrections of
-    :class:`Descent` start from the last stable equilibrium. An unstable point is left along its
-    lowest direction, towards the last stable equilibrium, or to the lower potential."""
+    """A stable equilibrium at a load beyond which the path is unstable."""
+    # Corrections of :class:`Descent` start from the last stable equilibrium. An unstable point is
+    # left along its lowest direction, towards the last stable equilibrium, or to the lower
+    # potential.
     system, start, load = increment.system, increment.start, increment.load
     u, multipliers = start.u, start.multipliers
     for _ in range(KICKS):

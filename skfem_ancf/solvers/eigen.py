@@ -33,12 +33,12 @@ REAL = 1e-7  # relative imaginary part of a real eigenvalue
 
 
 def modes(system: System, state: State, k: int) -> Modes:
-    """The k lowest natural frequencies about a state (smallest real part of ``lambda``). The
-    eigenvalues of ``K x = lambda M x`` are the largest of ``(K + s M)^-1 M`` with a small shift s.
-    Solutions are refined by strains, and eigenvalues are quotients of sums of squared strains: low
-    (bending) frequencies are accurate although the highest eigenvalues are ``(L / h)^4`` times
-    larger. Without a potential they may be complex. Points that touch with friction stick, also if
-    they slip."""
+    """The k lowest natural frequencies about a state (smallest real part of ``lambda``)."""
+    # The eigenvalues of ``K x = lambda M x`` are the largest of ``(K + s M)^-1 M`` with a small
+    # shift s. Solutions are refined by strains, and eigenvalues are quotients of sums of squared
+    # strains: low (bending) frequencies are accurate although the highest eigenvalues are ``(L /
+    # h)^4`` times larger. Without a potential they may be complex. Points that touch with friction
+    # stick, also if they slip.
     system = system.after(state.memory).sticking()
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
     if tangent.size[0] <= DENSE:
@@ -70,8 +70,8 @@ def rest_modes(system: System, k: int) -> tuple[Array, Array]:
 
 
 def improved(system: System, shapes: Array) -> Array:
-    """Frequencies (k,) at rest near those of approximate shapes (k, N), the lowest first. By two
-    steps of subspace iteration."""
+    """Frequencies (k,) at rest near those of approximate shapes (k, N), the lowest first."""
+    # By two steps of subspace iteration.
     state = State(system, np.zeros(system.N), load=0.0)
     tangent = StrainTangent(system, state.u, 0.0, None, state.multipliers)
     M, X = _free_mass(system, tangent), shapes[:, tangent.free].T
@@ -161,8 +161,8 @@ def _dense(tangent, M, k, shift):
 
 
 def _sparse(tangent, state, M, k, shift):
-    """The k lowest modes by Lanczos on the inverse, and one step of subspace iteration. Lanczos may
-    miss some of equal frequencies: they are counted, and the missing ones computed."""
+    """The k lowest modes by Lanczos on the inverse, and one step of subspace iteration."""
+    # Lanczos may miss some of equal frequencies: they are counted, and the missing ones computed.
     inverse, rng = Inverse(tangent, M, shift), np.random.default_rng(0)
     start = inverse.solve(rng.standard_normal(M.shape[0]))
     apply = inverse.once if inverse.left < UNREFINED else inverse.solve
@@ -192,8 +192,8 @@ def _lanczos(M, k, shift, apply, start):
 
 
 def _missing(tangent, state, shift, values):
-    """Number of missing eigenvalues below the largest one found, by Sylvester's law of inertia. It
-    is 1 if there are no factors."""
+    """Number of missing eigenvalues below the largest one found, by Sylvester's law of inertia."""
+    # It is 1 if there are no factors.
     below = values[-1] - SAME * max(abs(values[-1]), shift)
     try:
         number = _negative(tangent, state, -below)
@@ -242,12 +242,12 @@ def _unsymmetric(tangent, M, k, shift, small):
 
 
 def buckling(system: System, k: int, state: State | None = None) -> Buckling:
-    """The k lowest positive load factors of linear buckling. ``(K_0 + factor K_s) phi = 0``, with
-    the geometric stiffness K_s of the linear stress under full load, including support
-    displacements and load stiffness. Factors with a prebuckling strain of order one are omitted;
-    without a potential, only real factors (divergence) are found. With a state, whose loads are
-    constant, K_0 is its tangent; otherwise that of the state without loads, in which prestressed
-    springs and energies that are not scaled may push."""
+    """The k lowest positive load factors of linear buckling."""
+    # ``(K_0 + factor K_s) phi = 0``, with the geometric stiffness K_s of the linear stress under
+    # full load, including support displacements and load stiffness. Factors with a prebuckling
+    # strain of order one are omitted; without a potential, only real factors (divergence) are
+    # found. With a state, whose loads are constant, K_0 is its tangent; otherwise that of the state
+    # without loads, in which prestressed springs and energies that are not scaled may push.
     system.constraints.require_supports()
     state = state or _prestressed(system)
     system = system.after(system.histories.of_state(state))

@@ -101,8 +101,8 @@ class Increment:
         return found
 
     def resting(self) -> Equilibrium | None:
-        """The last equilibrium, if only round-off acts there; else None. As of a body in a turned
-        scene that just touches an obstacle."""
+        """The last equilibrium, if only round-off acts there; else None."""
+        # As of a body in a turned scene that just touches an obstacle.
         system, (u, multipliers) = self.system, (self.start.u, self.start.multipliers)
         tables = system.backend.tables
         target, *_ = self._target(tables, u, system.solver)
@@ -125,10 +125,10 @@ class Increment:
             "multipliers": found.multipliers, "force": found.force, "seen": found.seen})
 
     def _augmented(self):
-        """Repeat with corrected pressures until the penetration is within tolerance. Where the body
-        alone is unstable, as a buckled strip at a wall, corrections converge only if obstacles are
-        stiffer than it is unstable, see Bertsekas: "Constrained Optimization and Lagrange
-        Multiplier Methods", Academic Press 1982, 2.2."""
+        """Repeat with corrected pressures until the penetration is within tolerance."""
+        # Where the body alone is unstable, as a buckled strip at a wall, corrections converge only
+        # if obstacles are stiffer than it is unstable, see Bertsekas: "Constrained Optimization and
+        # Lagrange Multiplier Methods", Academic Press 1982, 2.2.
         contacts = self.system.forces.contacts
         found = self._touching()
         for _ in range(AUGMENTED):
@@ -193,10 +193,10 @@ class Increment:
 
     def iterate(self, begin: Any = None, options: Options | None = None, solver: Any = None,
                 backend: Any = None, by_third: bool = False) -> Equilibrium:
-        """Iterate to equilibrium from ``begin``, by default the last one; raises LoadStepFailed.
-        ``solver`` solves the linear systems, such as a
-        :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws;
-        ``by_third`` stops if the third correction is not smaller than the first."""
+        """Iterate to equilibrium from ``begin``, by default the last one; raises LoadStepFailed."""
+        # ``solver`` solves the linear systems, such as a
+        # :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws;
+        # ``by_third`` stops if the third correction is not smaller than the first.
         system, options = self.system, options or self.options
         u = self.start.u if options.guess is None else options.guess
         u, multipliers = (begin or (u, self.start.multipliers))[:2]

@@ -25,10 +25,10 @@ CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE = range(5)
 
 @source
 def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
-    """Iterate from x[U] and the multipliers m[0], with c of the joints in m[3] and their g.
-    ``factors`` are load factors and those of the first tangent, (2, k); ``record`` gets residuals
-    and works. Returns the status, the numbers of residuals and of works, whether the last factors
-    are those of ``e.factors``, and what :func:`examine` says of an equilibrium."""
+    """Iterate from x[U] and the multipliers m[0], with c of the joints in m[3] and their g."""
+    # ``factors`` are load factors and those of the first tangent, (2, k); ``record`` gets residuals
+    # and works. Returns the status, the numbers of residuals and of works, whether the last factors
+    # are those of ``e.factors``, and what :func:`examine` says of an equilibrium.
     residuals, works = record[0], record[1]
     u, du, force, load, R, moved = x[U], x[DU], x[FORCE], x[LOAD], x[RESIDUAL], x[MOVED]
     multipliers, phi, dm = m[0], m[1], m[2]

@@ -193,8 +193,8 @@ class Search:
         raise self._lost()
 
     def _strategies(self) -> Iterator[tuple[str, Callable[[], StaticResult]]]:
-        """Names and functions of strategies, in order; what applies depends on those before. Each
-        stops after some iterations but the last, load steps as small as may be."""
+        """Names and functions of strategies, in order; what applies depends on those before."""
+        # Each stops after some iterations but the last, load steps as small as may be.
         rules, system, at_once = self.rules, self.system, self._at_once
         if not self._auto:
             yield METHODS[rules.method], partial(self.load_steps, rules.method)
@@ -243,8 +243,9 @@ class Search:
             logger.info("%s: %s", self.attempts[-1], failure)
 
     def _done(self, result):
-        """The result with its message. If it was not found easily, the path from the reference
-        configuration is followed: has the load a maximum below 1?"""
+        """The result with its message."""
+        # If it was not found easily, the path from the reference configuration is followed: has the
+        # load a maximum below 1?
         system, loads = self.system, [0.0]
         own = any(hasattr(load, "psi") for load in system.loads)
         if (not result.doubt and (len(self.attempts) > 1 or (own and result.iterations > SURE))
@@ -354,8 +355,8 @@ class Search:
         return self.load_steps("newton", moved, start, few=True)
 
     def descent(self, route: Route | None = None, most: int = descent.DESCENT) -> StaticResult:
-        """The equilibrium at full load by a descent of ``most`` iterations. It goes to a minimum of
-        the potential, by a trust-region method."""
+        """The equilibrium at full load by a descent of ``most`` iterations."""
+        # It goes to a minimum of the potential, by a trust-region method.
         route = route or self.route
         result, options = self._beginning(route), self._options(route, "mixed")
         step = Increment(self.system, result, 1.0, options)
@@ -439,9 +440,9 @@ class Search:
     def load_steps(self, method: str, route: Route | None = None,
                    result: StaticResult | None = None, size: float | None = None,
                    few: bool = False) -> StaticResult:
-        """The equilibrium at the end of a route by load steps, from a result on. The first one has
-        a ``size``. With ``few``, they stop after :data:`FEW` iterations, or if the first
-        :data:`CUT` steps fail."""
+        """The equilibrium at the end of a route by load steps, from a result on."""
+        # The first one has a ``size``. With ``few``, they stop after :data:`FEW` iterations, or if
+        # the first :data:`CUT` steps fail.
         rules, route = self.rules, route or self.route
         stable, result = self._ends_stable(route), result or self._beginning(route)
         size, cuts, spent = size or rules.first_step, 0, 0

@@ -190,8 +190,8 @@ def _fill(ax, line, values, scale):
 
 
 def _label(ax, lines, name, scale, least, size, unit):
-    """Write extremes of each line, the largest first, where there is room. One at an end of a
-    member is moved along it, away from what meets there."""
+    """Write extremes of each line, the largest first, where there is room."""
+    # One at an end of a member is moved along it, away from what meets there.
     from matplotlib.patheffects import withStroke
 
     places = []

@@ -258,8 +258,9 @@ def frame(ax: Any, scenery: Scenery, wide: bool) -> None:
 
 def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any,
           fill: str | None = None) -> tuple[Any, list[Any]]:
-    """Draw frames over each other; returns the coloured image, or None, and all artists. With a
-    colour ``fill`` the reference configuration has it and nothing is coloured by the field."""
+    """Draw frames over each other; returns the coloured image, or None, and all artists."""
+    # With a colour ``fill`` the reference configuration has it and nothing is coloured by the
+    # field.
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 

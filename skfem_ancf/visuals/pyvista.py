@@ -403,9 +403,10 @@ class Explorer:
 
 def explorer(solve: Callable[[Any, Any], Any], interval: Any, value: Any, title: str,
              place: Callable[[Any], Array] | None, picture: dict[str, Any]) -> Explorer:
-    """An Explorer with its slider, or with its arrow if a place is given. ``solve`` and ``picture``
-    are for :class:`Explorer`, ``place`` for :meth:`Explorer.arrow`; ``interval, value, title`` are
-    ends, start and title of the slider, or ``value`` is the initial force (2,)."""
+    """An Explorer with its slider, or with its arrow if a place is given."""
+    # ``solve`` and ``picture`` are for :class:`Explorer`, ``place`` for :meth:`Explorer.arrow`;
+    # ``interval, value, title`` are ends, start and title of the slider, or ``value`` is the
+    # initial force (2,).
     if place is not None:
         made = Explorer(solve, [require_finite("the force", value, (2,))], **picture)
         made.arrow(place)

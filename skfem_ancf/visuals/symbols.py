@@ -24,9 +24,9 @@ NOTES = "eigenstrain", "drag"
 
 
 def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> list[Symbol]:
-    """Symbols of the loads, and of all other items, of the scene of a state. With ``start`` loads
-    have their full values, as before the solution; those that move or depend on time are those at
-    time 0, or at 1 if they vanish there."""
+    """Symbols of the loads, and of all other items, of the scene of a state."""
+    # With ``start`` loads have their full values, as before the solution; those that move or depend
+    # on time are those at time 0, or at 1 if they vanish there.
     if not (loads or supports):
         return []
     system: Any = getattr(state, "system", None)

@@ -181,8 +181,8 @@ class Contacts:
 
     @contextmanager
     def without_friction(self, soft: bool = False) -> Iterator[None]:
-        """Context in which nothing sticks, if ``soft`` with reduced stiffness too. Iterations
-        converge there more easily, to a nearby state."""
+        """Context in which nothing sticks, if ``soft`` with reduced stiffness too."""
+        # Iterations converge there more easily, to a nearby state.
         memory, numbers = self.tables.memory, [
             self.pair(k).numbers for k in range(len(self.groups))]
         before, sticks = [x[STIFFNESS] for x in numbers], memory[ANCHORED]
@@ -205,9 +205,9 @@ class Contacts:
         return other
 
     def stick(self) -> None:
-        """Let all points that touch stick in tangents, also those that slip. Points that have
-        slipped are at the limit of friction, on one side of it or the other by the last digit; and
-        of a disturbance either way friction resists one."""
+        """Let all points that touch stick in tangents, also those that slip."""
+        # Points that have slipped are at the limit of friction, on one side of it or the other by
+        # the last digit; and of a disturbance either way friction resists one.
         self.tables.memory[ANCHORED] *= 2.0
 
     def begin(self, u: Array, t: float, anew: bool) -> None:
@@ -239,9 +239,9 @@ class Contacts:
         self.firmness[:] = firmness
 
     def stiffened(self, k: int, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """Derivatives by the logarithm of the stiffness of group k, and forces, of the pressure.
-        Those of the force on the degrees of freedom (N,); then by point the derivative, and the
-        force, times the penetration, (n,)."""
+        """Derivatives by the logarithm of the stiffness of group k, and forces, of the pressure."""
+        # Those of the force on the degrees of freedom (N,); then by point the derivative, and the
+        # force, times the penetration, (n,).
         (_, group), _, gap = self.look(u, t)[k]
         memory, pair, firm = self.tables.memory, self.pair(k), 1.0 + self.firmness[k]
         width, a = transition(pair), np.maximum(-gap, 0.0)
@@ -258,11 +258,11 @@ class Contacts:
                 push * mean_pressure(a, a, width))
 
     def yielding(self, u: Array, t: float, respond: Callable[..., Any]) -> Array:
-        """The relative error of the answer by the penetration, shape (groups,), to first order. For
-        obstacles of default stiffness that the ends of a beam or a stout body touch: that of their
-        forces, or of the largest displacement. A slender beam yields more in bending. ``respond``
-        returns changes of displacements (N,) for forces (N,), from the tangent, and a measure of
-        displacements; None without a tangent."""
+        """The relative error of the answer by the penetration, shape (groups,), to first order."""
+        # For obstacles of default stiffness that the ends of a beam or a stout body touch: that of
+        # their forces, or of the largest displacement. A slender beam yields more in bending.
+        # ``respond`` returns changes of displacements (N,) for forces (N,), from the tangent, and a
+        # measure of displacements; None without a tangent.
         out = np.zeros(len(self.groups))
         for k, ((_, group), _, gap) in enumerate(self.look(u, t)):
             if group.firmest <= 1.0 or not np.any(gap < 0.0):
@@ -297,9 +297,9 @@ class Contacts:
     # restrictions of solvers
 
     def require_clear(self, u: Array, t: float) -> None:
-        """Raise InputError if an obstacle cuts a body at the start. ``u`` (N,) is the displacement
-        there. Unless it is zero the start may be in contact, and is refused from a penetration of
-        its height on; obstacles that move may push it."""
+        """Raise InputError if an obstacle cuts a body at the start."""
+        # ``u`` (N,) is the displacement there. Unless it is zero the start may be in contact, and
+        # is refused from a penetration of its height on; obstacles that move may push it.
         if not self.obstacles or (self._starts_clear and self.untouched(u)):
             return
         given = bool(np.any(u))
@@ -341,9 +341,9 @@ class Contacts:
                                  f"penalty, not {one!r}: use solve_static")
 
     def require_penalty(self, scheme: Any, kick: float) -> None:
-        """Raise InputError if the augmented Lagrangian is unstable with a scheme. A force that
-        stops a body at the end of a step continues to act: a speed 1 becomes up to ``kick - 1``
-        with ``(1 - alpha_m) / ((1 - alpha_f) beta)``."""
+        """Raise InputError if the augmented Lagrangian is unstable with a scheme."""
+        # A force that stops a body at the end of a step continues to act: a speed 1 becomes up to
+        # ``kick - 1`` with ``(1 - alpha_m) / ((1 - alpha_f) beta)``.
         reason = BY_POINTS if kick == np.inf else (
             f"a body that is stopped in a step would rebound up to {kick - 1.0:.2g} times as fast")
         for one in self.obstacles:
@@ -362,8 +362,8 @@ class Contacts:
             self.put(t, 0.0, self.tables.poses)
 
     def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:
-        """For each group its obstacle's number, the :class:`Group`, points (2, n) and gaps (n,).
-        Points are relative to the origin."""
+        """For each group its obstacle's number, the :class:`Group`, points (2, n) and gaps (n,)."""
+        # Points are relative to the origin.
         self._place(t)
         out = []
         for k, group in enumerate(self.groups):
@@ -373,8 +373,9 @@ class Contacts:
         return out
 
     def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
-        """Contact forces; in statics without velocities. For each group its obstacle's number,
-        points (2, n), forces (2, n), pressures and gaps (n,)."""
+        """Contact forces; in statics without velocities."""
+        # For each group its obstacle's number, points (2, n), forces (2, n), pressures and gaps
+        # (n,).
         self._place(t)
         out = []
         for k, (which, group) in enumerate(self.groups):
@@ -476,8 +477,8 @@ class Contacts:
 
 
 def _inside(group, x, places, depth):
-    """The number of the first place (2, k) that is deeper than ``depth`` in a body, or None. ``x``
-    (2, n) are the points of its surface."""
+    """The number of the first place (2, k) that is deeper than ``depth`` in a body, or None."""
+    # ``x`` (2, n) are the points of its surface.
     m, half = group.points, group.points // 2
     sides = x[:, :-2 * m].reshape(2, -1, 2, half)
     loops = np.concatenate([sides[:, :, 0], sides[:, :, 1, ::-1]], axis=2)  # around each element

@@ -33,9 +33,9 @@ class CrossingGuard:
                        if group.depth < np.inf]
 
     def first(self, u: Array, v: Array | None, t: Array) -> tuple[int, str]:
-        """Number of steps without a crossing, and text about the obstacle of the next one.
-        Arguments are displacements and velocities at all instants, (n + 1, N), None for straight
-        paths, and times or load factors, (n + 1,)."""
+        """Number of steps without a crossing, and text about the obstacle of the next one."""
+        # Arguments are displacements and velocities at all instants, (n + 1, N), None for straight
+        # paths, and times or load factors, (n + 1,).
         done, text = len(t) - 1, ""
         for path in self._paths:
             k = path.first(u[:done + 1], None if v is None else v[:done + 1], t[:done + 1])

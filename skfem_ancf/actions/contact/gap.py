@@ -39,8 +39,8 @@ def places(pair, u, factor, at, z):
 
 @apart("contacts", PAIR, F1, float, F2, F1)
 def middles(pair, u, factor, x, radius):
-    """Positions of element middles (2, n), and bounds of the distance of their points. Reference
-    positions are multiplied by ``factor``."""
+    """Positions of element middles (2, n), and bounds of the distance of their points."""
+    # Reference positions are multiplied by ``factor``.
     n, half, largest = x.shape[1], pair.header[PAIRS] // 2, pair.numbers[RADIUS]
     m = pair.first.size // n
     first, p, q = pair.first[::m], pair.middles[0], pair.middles[1]
@@ -117,9 +117,9 @@ def distances(pair, which, whole, x, out):
 
 @source
 def disc(shape, whole, y, out):
-    """Gap of a circle, from its radius and a point of its surface with the normal there. The
-    difference of squares is zero at that point, so that a circle far larger than the scene has gaps
-    without the round-off of its radius."""
+    """Gap of a circle, from its radius and a point of its surface with the normal there."""
+    # The difference of squares is zero at that point, so that a circle far larger than the scene
+    # has gaps without the round-off of its radius.
     radius, px, py, nx, ny = shape[0], shape[1], shape[2], shape[3], shape[4]
     for i in indices(y.shape[1]):
         a, b = y[0, i] - px, y[1, i] - py
@@ -134,10 +134,10 @@ def disc(shape, whole, y, out):
 
 @apart("contacts", F1, bool, F2, F2)
 def outline(shape, whole, y, out):
-    """Closest point projection on a polygon with rounded corners. Parameters of the shape: radius
-    of the corners, relative ends of the edges, then for each corner: position, vector to the next
-    one, 1 or -1 for convex or not. The surface is a line near an edge, a circle near a corner. A
-    circle alone has five parameters, see :func:`disc`."""
+    """Closest point projection on a polygon with rounded corners."""
+    # Parameters of the shape: radius of the corners, relative ends of the edges, then for each
+    # corner: position, vector to the next one, 1 or -1 for convex or not. The surface is a line
+    # near an edge, a circle near a corner. A circle alone has five parameters, see :func:`disc`.
     if shape.size == DISC:
         disc(shape, whole, y, out)
         return

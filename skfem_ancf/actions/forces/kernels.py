@@ -145,8 +145,8 @@ def at_rest(tables, u0, u1):
 
 @source
 def add_elastic_force(tables, t, span, u0, u1, f):
-    """Add the mean force at zero velocity with exact work from u0 to u1. It is a mean over a time
-    span about t; the force at t for u0 = u1 and span zero."""
+    """Add the mean force at zero velocity with exact work from u0 to u1."""
+    # It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
     if tables.changing > 0 and not at_rest(tables, u0, u1):

@@ -440,15 +440,13 @@ class Forces:
 
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
-        """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.call_custom`.
-
-        ``what`` is 0: the mean force at zero velocity between positions a and b, over a span of
-        time ``factor``; 1: the force at a due to velocities b; 2: the derivatives by positions,
-        plus a factor times those by velocities; 3: keep the angles of torsional springs at a; 4:
-        set the histories at the end of a step from a to b, with velocities in the second half of
-        b, and add what it dissipates. From 5 on a and b are displacements (N,), see
-        :meth:`_of_pattern`.
-        """
+        """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.call_custom`."""
+        # ``what`` is 0: the mean force at zero velocity between positions a and b, over a span of
+        # time ``factor``; 1: the force at a due to velocities b; 2: the derivatives by positions,
+        # plus a factor times those by velocities; 3: keep the angles of torsional springs at a; 4:
+        # set the histories at the end of a step from a to b, with velocities in the second half of
+        # b, and add what it dissipates. From 5 on a and b are displacements (N,), see
+        # :meth:`_of_pattern`.
         if what >= PUSHING:
             self._of_pattern(what, t, factor, a, b, out)
             return

@@ -173,10 +173,10 @@ def _along_elements(group):
 
 
 def _balanced(group, pressure):
-    """The nodal pressure (n,) in equilibrium with the forces of points; zero at free points. The
-    nodal force over the area of its shape function (lumped) on the contact surface; free points
-    between two in contact count if these are less than an element apart. The positions of both
-    nodes have the functions number 0 and half; each side of the beam is separate."""
+    """The nodal pressure (n,) in equilibrium with the forces of points; zero at free points."""
+    # The nodal force over the area of its shape function (lumped) on the contact surface; free
+    # points between two in contact count if these are less than an element apart. The positions of
+    # both nodes have the functions number 0 and half; each side of the beam is separate.
     from scipy.ndimage import binary_closing  # its import takes as long as a solution
 
     n, m, half = group.elements, group.points, len(group.weights) // 2
@@ -204,9 +204,9 @@ def _balanced(group, pressure):
 
 
 def _corners(group, touching):
-    """Points at corners, and a point each of the face there that touches more; (2, k). A corner is
-    a point of bottom or top and points of an end. A face that touches only there faces away from
-    the obstacle: its force is on the other one."""
+    """Points at corners, and a point each of the face there that touches more; (2, k)."""
+    # A corner is a point of bottom or top and points of an end. A face that touches only there
+    # faces away from the obstacle: its force is on the other one.
     m, last = group.points, (group.elements - 2) * group.points
     places, pairs = np.vstack([group.starts[:2], group.offsets]), []
     for end, element, first in ((last, 0, 0), (last + m, last - m, -1)):

@@ -225,8 +225,8 @@ class BodyContact(ForceElement):
         return zeta, search.begins[p] - gap[p]
 
     def _mean_place(self, p, e, ends, wanted, z0, z1):
-        """Pairs at the place between two ``ends`` (2, n) where the gap changes as wanted. The gap
-        is least at the closest point, so there is one. Also the change there."""
+        """Pairs at the place between two ``ends`` (2, n) where the gap changes as wanted."""
+        # The gap is least at the closest point, so there is one. Also the change there.
         S = self.search.surfaces
 
         def at(zeta):

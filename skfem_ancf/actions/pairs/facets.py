@@ -79,8 +79,8 @@ def _joined(parts, origin):
 
 
 def _facets(dofs, weights, x, zeta, rule, widths, **values):
-    """Facets from weights (F, B, n) and places x (F, n) at n points zeta, with points of a rule.
-    ``values`` are other fields, numbers or (F,)."""
+    """Facets from weights (F, B, n) and places x (F, n) at n points zeta, with points of a rule."""
+    # ``values`` are other fields, numbers or (F,).
     F, (points, w) = len(dofs), rule
     fit = np.linalg.inv(np.vander(zeta, increasing=True)).T
     starts, number = x @ fit, np.arange(F)

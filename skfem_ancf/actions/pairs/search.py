@@ -109,8 +109,8 @@ class Search:
                           skin)
 
     def touching(self, z: Array) -> Touching:
-        """The pairs with a gap below the one at which the pressure begins. The last ones are kept:
-        forces and stiffnesses ask for the same states in turn."""
+        """The pairs with a gap below the one at which the pressure begins."""
+        # The last ones are kept: forces and stiffnesses ask for the same states in turn.
         for at, found in self._last:
             if np.array_equal(at, z):
                 return found
@@ -159,8 +159,8 @@ class Search:
     # parts that are one body
 
     def _together(self, p, e, zeta, less):
-        """True for points and facets of one beam, or of joined ones, near to each other. Closer by
-        ``less`` (F,)."""
+        """True for points and facets of one beam, or of joined ones, near to each other."""
+        # Closer by ``less`` (F,).
         f = self.surfaces.facets
         own, a = f.of[p], self._along(f.of[p], f.zeta[p])
         b, apart = self._along(e, zeta), APART * f.heights[e] - less[e]
@@ -190,8 +190,8 @@ class Search:
                 0.5 * (s[:, :-1] + s[:, 1:]).ravel(), f.members[e])
 
     def _joined(self, solids):
-        """Chains and places on them, two each, where axes meet in the reference configuration. Or
-        where axes are in ``solids``, pairs of a member's number and a function of places."""
+        """Chains and places on them, two each, where axes meet in the reference configuration."""
+        # Or where axes are in ``solids``, pairs of a member's number and a function of places.
         ends, chains, s, _ = axes = self._axes(np.zeros(self.surfaces.facets.dofs.max() + 1), FINE)
         out, f, near = [], self.surfaces.facets, JOINED * self.height
         for k, contains in solids:

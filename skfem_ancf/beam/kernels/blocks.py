@@ -236,8 +236,8 @@ def from_points(t, first, S, T):
 
 @source
 def stresses(t, first, E, change, T):
-    """Weighted stresses of strains E. With a ``change`` about E, their work on it is the change of
-    the energy."""
+    """Weighted stresses of strains E."""
+    # With a ``change`` about E, their work on it is the change of the energy.
     if t.law.kind == LINEAR:
         times(t.pattern.pairs, block(t.H, first), E, T)
     else:

@@ -26,8 +26,8 @@ MIDDLE = 1200.0
 
 
 def softened(weight: float) -> tuple[Array, Array]:
-    """Three points on [0, 1], exact for cubics: two Gauss points and a weighted middle one. A
-    weight of 4/9 gives the three-point Gauss rule, which is the maximum."""
+    """Three points on [0, 1], exact for cubics: two Gauss points and a weighted middle one."""
+    # A weight of 4/9 gives the three-point Gauss rule, which is the maximum.
     weight = min(weight, 4.0 / 9.0)
     x = 0.5 / np.sqrt(3.0 * (1.0 - weight))
     outer = 0.5 * (1.0 - weight)

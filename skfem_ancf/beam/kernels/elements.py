@@ -52,9 +52,9 @@ def scaled(G: Array) -> tuple[Array, Array, Array]:
 
 @lru_cache(64)
 def _entries(m: int) -> Any:
-    """Lower half of an element matrix with the left node's position, from its parts. Returns rows,
-    columns and signs of the entries; functions (without the left node's) and part of each: xx, yy,
-    or xy, the component x of the first and y of the second function."""
+    """Lower half of an element matrix with the left node's position, from its parts."""
+    # Returns rows, columns and signs of the entries; functions (without the left node's) and part
+    # of each: xx, yy, or xy, the component x of the first and y of the second function.
     i, j = np.tril_indices(2 * m + 2)
     (k, x), (l, y) = divmod(i, 2), divmod(j, 2)
     sign = np.where(k == 0, -1.0, 1.0) * np.where(l == 0, -1.0, 1.0)
@@ -141,8 +141,8 @@ class Elements:
         return d.reshape(-1, 2, self.ne) * self.R
 
     def measured(self, r: Array) -> Any:
-        """What :meth:`directions` needs of rows. For cables this is r_X and r_XX as complex
-        numbers, |r_X| and the material curvature."""
+        """What :meth:`directions` needs of rows."""
+        # For cables this is r_X and r_XX as complex numbers, |r_X| and the material curvature.
         if self.kind != CABLE:
             return r
         z = r[:, 0] + 1j * r[:, 1]
@@ -163,8 +163,8 @@ class Elements:
         return found
 
     def directions(self, one: Any, two: Any) -> Array:
-        """Directions (n, 2, ne) whose products with a change of the rows are that of the strain.
-        For equal measures these are derivatives."""
+        """Directions (n, 2, ne) whose products with a change of the rows are that of the strain."""
+        # For equal measures these are derivatives.
         if self.kind != CABLE:
             return one if one is two else 0.5 * (one + two)
         (a, b, p, k), (c, d, q, l) = one, two
@@ -206,9 +206,10 @@ class Elements:
 
     def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
                ) -> Array:
-        """Weighted stresses (ns, ne). With a ``change``, ``strain`` is its middle and the work of
-        the stresses on the change is the change of energy. With a ``shift`` (3, points, ne) of the
-        strain of a nonlinear law, it is the difference that the shift makes."""
+        """Weighted stresses (ns, ne)."""
+        # With a ``change``, ``strain`` is its middle and the work of the stresses on the change is
+        # the change of energy. With a ``shift`` (3, points, ne) of the strain of a nonlinear law,
+        # it is the difference that the shift makes.
         if self.t.law.kind == LINEAR:
             return self.linear_stress(strain)
         E, C = self.at_points(strain), None if change is None else self.at_points(change)
@@ -316,9 +317,9 @@ class Elements:
                 else None)
 
     def geometric(self, one: Any, T: Array) -> Array:
-        """Coefficients (ns, 3, ne) of xx, yy and xy + yx of the geometric part, or of xx = yy.
-        Those of cables are ``Im(Z v v)`` for the change v of r_X, and ``Im(z v w)`` for v and the
-        change w of r_XX."""
+        """Coefficients (ns, 3, ne) of xx, yy and xy + yx of the geometric part, or of xx = yy."""
+        # Those of cables are ``Im(Z v v)`` for the change v of r_X, and ``Im(z v w)`` for v and the
+        # change w of r_XX.
         if self.kind != CABLE:
             return T[:, None]
         (a, b, p, _), n = one, len(T) // 2
@@ -368,8 +369,8 @@ class Elements:
         return sign[:, None] * self.D[k, 0] * self.D[l, 0]
 
     def tangent(self, one: Any, Y: Array, T: Array, moduli: Array | None) -> Array:
-        """Lower halves (entries, ne) of the element tangents, without the constant stiffness.
-        ``moduli`` None leaves out the material part; T are the stresses of the geometric part."""
+        """Lower halves (entries, ne) of the element tangents, without the constant stiffness."""
+        # ``moduli`` None leaves out the material part; T are the stresses of the geometric part.
         n, geometric = self.ns, self.geometric(one, T) * self._terms[6]
         if moduli is None:
             terms = len(self._terms[0])

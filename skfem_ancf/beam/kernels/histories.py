@@ -109,8 +109,8 @@ class ElementsWithHistory(Elements):
 
     def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
                ) -> Array:
-        """Weighted stresses (ns, ne); with a ``change`` of the strain the mean of both ends. The
-        work of this mean is the change of the stored energy and what is dissipated."""
+        """Weighted stresses (ns, ne); with a ``change`` of the strain the mean of both ends."""
+        # The work of this mean is the change of the stored energy and what is dissipated.
         if change is None:
             return self._weighted(self.evaluate(self.at_points(strain))[0])
         E, half = self.at_points(strain), 0.5 * self.at_points(change)

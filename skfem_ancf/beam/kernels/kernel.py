@@ -121,9 +121,9 @@ class ElementKernel:
         return self._forces(u, given=stresses)
 
     def eigenstrain_forces(self, given: list[Array], u: Array, end: Array | None = None) -> Array:
-        """Change of :meth:`forces`, or of their mean from u to ``end``, by eigenstrains. ``given``
-        are stresses for tables of linear laws, and strains at the points of others, (3, points,
-        ne)."""
+        """Change of :meth:`forces`, or of their mean from u to ``end``, by eigenstrains."""
+        # ``given`` are stresses for tables of linear laws, and strains at the points of others, (3,
+        # points, ne).
         if np.iscomplexobj(u):
             return self.eigenstrain_forces(given, u.real) + 1j * self._times(
                 self.eigenstrain_tangents(given, u.real), u.imag)
@@ -184,8 +184,8 @@ class ElementKernel:
         return self._tangents(_run_tangent, u, self._apart)
 
     def geometric(self, u: Array, stress: Array) -> Array:
-        """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m). The stresses of all
-        :attr:`tables` are side by side; further columns are ignored."""
+        """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m)."""
+        # The stresses of all :attr:`tables` are side by side; further columns are ignored.
         given = np.split(stress, np.cumsum([t.rows.shape[1] for t in self.tables]), axis=1)
         return self._tangents(_run_geometric, u, self._apart, given)
 

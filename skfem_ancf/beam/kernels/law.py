@@ -59,10 +59,10 @@ def material_of(law: LawTables) -> Any:
 
 @apart("laws", LawTables, F3, F3)
 def law_evaluate(law, strain, out):
-    """Second Piola-Kirchhoff stress, moduli or energy per volume of a nonlinear law. ``strain`` is
-    (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements). The shape of ``out`` selects the result: (3,
-    n, elements) stress, (9, ...) moduli (c, d) at 3 c + d, (12, ...) both in NumPy, (1, ...)
-    energy."""
+    """Second Piola-Kirchhoff stress, moduli or energy per volume of a nonlinear law."""
+    # ``strain`` is (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements). The shape of ``out`` selects
+    # the result: (3, n, elements) stress, (9, ...) moduli (c, d) at 3 c + d, (12, ...) both in
+    # NumPy, (1, ...) energy.
     n, size = strain.shape[1], strain.shape[2]
     x = np.empty(strain.shape, strain.dtype)
     for c in range(3):  # with the shear correction

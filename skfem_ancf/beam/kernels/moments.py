@@ -43,11 +43,11 @@ def add_moments(moments, factors, u, f):
 
 @source
 def mean_turning(a, b, g):
-    """A mean derivative of the angle from e to d, whose work from a to b is the change of angle.
-    The rows of a, b and g are components of d and e. The angle is a function of ``c = e . d`` and
-    ``s = e x d``. Its discrete gradient by both (Gonzalez 1996), times their derivatives in the
-    middle of the step, has no resultant moment, since both are invariant under common rotations of
-    d and e."""
+    """A mean derivative of the angle from e to d, whose work from a to b is the change of angle."""
+    # The rows of a, b and g are components of d and e. The angle is a function of ``c = e . d`` and
+    # ``s = e x d``. Its discrete gradient by both (Gonzalez 1996), times their derivatives in the
+    # middle of the step, has no resultant moment, since both are invariant under common rotations
+    # of d and e.
     for e in indices(a.shape[1]):
         c0, s0 = a[2, e] * a[0, e] + a[3, e] * a[1, e], a[2, e] * a[1, e] - a[3, e] * a[0, e]
         c1, s1 = b[2, e] * b[0, e] + b[3, e] * b[1, e], b[2, e] * b[1, e] - b[3, e] * b[0, e]
@@ -68,8 +68,8 @@ def mean_turning(a, b, g):
 
 @apart("moments", MomentPack, F1, F1, F1, F1)
 def add_mean_moments(moments, factors, u0, u1, f):
-    """Add the mean forces from u0 to u1, whose work is the moments times the rotations. A couple
-    acts on the angle between its two sections, without resultant moment."""
+    """Add the mean forces from u0 to u1, whose work is the moments times the rotations."""
+    # A couple acts on the angle between its two sections, without resultant moment.
     M, opposite = moments.M, moments.opposite
     a, b, g = np.empty((4, 1)), np.empty((4, 1)), np.empty((4, 1))
     for k in range(M.size):

@@ -24,8 +24,8 @@ def _put(e, T, out):
 
 
 def _moved(e, u, v):
-    """Relative DOFs, change of the rows from the reference, that from u to v, and directions. With
-    v, DOFs and directions are means from u to v; without it, the second change is None."""
+    """Relative DOFs, change of the rows from the reference, that from u to v, and directions."""
+    # With v, DOFs and directions are means from u to v; without it, the second change is None.
     U, d, one, Y = e.at(u)
     if not v.size:
         return U, (d, one), None, Y
@@ -69,8 +69,8 @@ def run_linearised(e, u, du, given, out, f):
 
 @kernel
 def run_tangent(e, u, given, out, f, flat, ld):
-    """Tangent and force at u; writes the stresses. The geometric part has the given stresses, or
-    those of the strain if there are none."""
+    """Tangent and force at u; writes the stresses."""
+    # The geometric part has the given stresses, or those of the strain if there are none.
     U, d, one, Y = e.at(u)
     T, moduli = e.stress_and_moduli(e.strain(d, one))
     if f.size:
@@ -103,9 +103,9 @@ def run_put(e, given):
 
 @kernel
 def run_eigen_force(e, u, v, given, f):
-    """Change of the force at u, or with v of the mean from u to v, by eigenstrains. ``given`` are
-    stresses for a linear law, else strains at the points, (3, points, ne). Laws with a history have
-    it in their strain, see :func:`run_put`."""
+    """Change of the force at u, or with v of the mean from u to v, by eigenstrains."""
+    # ``given`` are stresses for a linear law, else strains at the points, (3, points, ne). Laws
+    # with a history have it in their strain, see :func:`run_put`.
     if e.t.law.kind == LINEAR:
         run_force(e, u, v, given, u[:0], f)
     elif e.t.law.kind != HISTORY:

@@ -122,9 +122,9 @@ class SectionKernel(ElementKernel):
 
 def beam_gradients(mesh: MeshBeam, element: ElementBeam, X: Array,
                    tind: Array | None = None) -> tuple[Array, Array]:
-    """Derivatives of the shape functions along the axis and across it, and the beam frame. Shapes
-    are (2, nelements, npoints, 2 nodal_dofs) and (2, nelements, npoints, 2); X (2, npoints) are
-    points of the reference cell."""
+    """Derivatives of the shape functions along the axis and across it, and the beam frame."""
+    # Shapes are (2, nelements, npoints, 2 nodal_dofs) and (2, nelements, npoints, 2); X (2,
+    # npoints) are points of the reference cell.
     slopes, frame = element.slopes(mesh.mapping(), X, tind)
     G = np.ascontiguousarray(slopes.transpose(1, 2, 3, 0))
     # derivatives of a translation vanish exactly

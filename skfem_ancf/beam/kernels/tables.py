@@ -60,9 +60,9 @@ class Pattern:
 
     @cached_property
     def coefficients(self) -> tuple[Array, ...]:
-        """Directions a and b, moduli, rows k and l, and factors of the coefficients of tangents.
-        Those of the products of the samples come first; the last item has their factors in the
-        geometric part."""
+        """Directions a and b, moduli, rows k and l, and factors of the coefficients of tangents."""
+        # Those of the products of the samples come first; the last item has their factors in the
+        # geometric part.
         (second, _, _, direction), ns, terms = self.ends, self.ns, self.terms
         first, rest = np.full(self.products.shape[1], -1), np.ones(terms.shape[1], bool)
         first[terms[0, ::-1]] = np.arange(len(rest))[::-1]
