@@ -27,8 +27,7 @@ from ..recovery.grids import layout, values_of_domain
 from ..visuals import diagrams, matplotlib, pyvista
 from ..visuals.diagrams import ROOM, lines_of
 from ..visuals.matplotlib import dress, new_axes, plot_scene
-from ..visuals.scenery import rounded, unit_of_resultant
-from ..visuals.symbols import symbols_of, unit_of_load
+from ..visuals.scenery import rounded, symbols_of, unit_of_load, unit_of_resultant
 from .checks import has_strength, materials_of
 
 #: Resolution of pictures in notebooks, in dots per inch.

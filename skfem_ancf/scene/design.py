@@ -134,10 +134,14 @@ class Design:
             A number as a function of the readings, an array (r,).
         """
         def value_and_gradient(p: ArrayLike) -> tuple[float, Array]:
-            y, J = self(p)
-            return float(function(y)), derivative(function, y) @ J
+            y = self.values(p)
+            return float(function(y)), self._weighted(derivative(function, y))
 
         return value_and_gradient
+
+    def _weighted(self, weights):
+        """The derivative (n,) of the sum of weighted readings (r,) at the last parameters."""
+        return weights @ self.jacobian(self._p)
 
     def to_jax(self, p: ArrayLike) -> Callable[[Any], Any]:
         """The readings (r,) as a function of p (n,) for JAX, with derivatives by the adjoint.

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import lsqr
 
-from ..actions.bound import BoundConstraint, BoundForce, derivative
+from ..actions.bound import BoundConstraint, BoundForce
 from ..actions.loads import Unscaled
 from ..actions.tables import mean_external_force
 from ..beam.kinematics import element_dofs, entries_of
@@ -205,21 +205,7 @@ class MotionDesign(Design):
 
     # backward
 
-    def objective(self, function: Callable[[Array], float]) -> Callable[[ArrayLike], Any]:
-        """For ``scipy.optimize.minimize(..., jac=True)``: a function of p, by the adjoint.
-
-        Parameters
-        ----------
-        function
-            A number as a function of the readings at all steps, an array (r,).
-        """
-        def value_and_gradient(p: ArrayLike) -> tuple[float, Array]:
-            y = self.values(p)
-            return float(function(y)), self._backward(derivative(function, y))
-
-        return value_and_gradient
-
-    def _backward(self, weights):
+    def _weighted(self, weights):
         """The derivative by the parameters of the sum of weighted readings (r,), (n,)."""
         p, c = self._p, self._built.system.constraints
         h = STEP * self._typical(p)

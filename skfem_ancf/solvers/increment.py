@@ -13,12 +13,12 @@ from ..equations import stability
 from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, joint_gap, rules_of
 from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
-from . import descent
+from . import strategies
 from .iteration import (CONVERGED, INDEFINITE, ITERATIONS, NOT_CONVERGED, NOT_FINITE, SINGULAR,
                         equilibrium)
 from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                       StaticResult, Unstable)
-from .contact_search import MOST_FROM_SOFT, search_contact
+from .strategies import MOST_FROM_SOFT, search_contact
 
 logger = logging.getLogger(__name__)
 
@@ -96,7 +96,7 @@ class Increment:
         if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
             raise Unstable("the equilibrium found is unstable", found)
         if (start.rejected and route.proportional and start.load > 0.0
-                and not descent.heads_on(system, start, found.u, self.level)):
+                and not strategies.heads_on(system, start, found.u, self.level)):
             raise Unstable("the equilibrium found lies on the side away from the load", found)
         return found
 
@@ -149,7 +149,7 @@ class Increment:
                              f"{AUGMENTED} corrections of the pressure")
 
     def _touching(self):
-        """Iterate, with obstacles by :mod:`skfem_ancf.solvers.contact_search`."""
+        """Iterate, with obstacles by :mod:`skfem_ancf.solvers.strategies`."""
         contacts, options = self.system.forces.contacts, self.options
         if not contacts.obstacles:
             return self._from_start(options)
@@ -164,7 +164,7 @@ class Increment:
         before = self.start.u, options.route.acting(self.start.load)[1]
         return search_contact(contacts, before, self.time, solve,
                               lambda u: self.system.strain_energy(u, self.time), self._response,
-                              LoadStepFailed, options.close, options.drag is not None)
+                              options.close, options.drag is not None)
 
     def _response(self, found):
         """The response at an equilibrium."""
@@ -195,7 +195,7 @@ class Increment:
                 backend: Any = None, by_third: bool = False) -> Equilibrium:
         """Iterate to equilibrium from ``begin``, by default the last one; raises LoadStepFailed."""
         # ``solver`` solves the linear systems, such as a
-        # :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws;
+        # :class:`~skfem_ancf.solvers.strategies.Descent`; ``backend`` is that of other laws;
         # ``by_third`` stops if the third correction is not smaller than the first.
         system, options = self.system, options or self.options
         u = self.start.u if options.guess is None else options.guess
@@ -290,7 +290,7 @@ class Increment:
         if unstable and route.gap is None and not start.steps and (
                 weak := stability.weak_at_rest(system)):
             raise ConvergenceError(weak, start)
-        if not unstable and not descent.near_limit(system, start):
+        if not unstable and not strategies.near_limit(system, start):
             return None
         if not stability.has_potential(system, start.u, self.load):
             if not isinstance(failure, Unstable):
@@ -300,7 +300,7 @@ class Increment:
                            "loads have no potential by which to find a stable equilibrium")
             return failure.found
         with np.errstate(all="ignore"):
-            found, saw_unstable = descent.leave_unstable(self)
+            found, saw_unstable = strategies.leave_unstable(self)
         if saw_unstable and not start.doubt:
             start.doubt = (
                 f"the path loses its stability between the load levels {start.load:.6g} and "

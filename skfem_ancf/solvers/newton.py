@@ -17,12 +17,12 @@ from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
 from ..equations import stability
 from ..equations.system import System
-from . import descent
+from . import strategies
 from .continuation import continuation
 from .increment import Increment, Options, Route
 from .outcome import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
-from .contact_search import MOST_FROM_SOFT
+from .strategies import MOST_FROM_SOFT
 
 logger = logging.getLogger(__name__)
 
@@ -94,7 +94,7 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     stable
         Reject unstable equilibria: a step that ends at one is cut, and where the path itself
         becomes unstable, the solution follows the unstable direction, see
-        :func:`~skfem_ancf.solvers.descent.descend`. False accepts any equilibrium.
+        :func:`~skfem_ancf.solvers.strategies.descend`. False accepts any equilibrium.
     memory
         Contact history at ``u``, shape (n,).
 
@@ -335,7 +335,7 @@ class Search:
             # a later strategy may find an equilibrium on the side away from the load
             if (self.attempts and self.stable and route.proportional
                     and not (self.stabilised_by_loads or self.touches)
-                    and not descent.heads_on(self.system, result, found.u, 1.0)):
+                    and not strategies.heads_on(self.system, result, found.u, 1.0)):
                 self._other = self._other or step.reached(found)
                 raise Unstable("the equilibrium found lies on the side away from the load", found)
         except FirstStepTooLarge:
@@ -354,7 +354,7 @@ class Search:
         start.load = 0.0
         return self.load_steps("newton", moved, start, few=True)
 
-    def descent(self, route: Route | None = None, most: int = descent.DESCENT) -> StaticResult:
+    def descent(self, route: Route | None = None, most: int = strategies.DESCENT) -> StaticResult:
         """The equilibrium at full load by a descent of ``most`` iterations."""
         # It goes to a minimum of the potential, by a trust-region method.
         route = route or self.route
@@ -364,7 +364,7 @@ class Search:
         if (not (system.symmetric or self.stabilised_by_loads or self._has_friction)
                 and not stability.has_potential(system, route.u, 1.0)):
             raise LoadStepFailed("the loads have no potential")
-        down, far = descent.Descent(system), options._replace(
+        down, far = strategies.Descent(system), options._replace(
             most=min(most, 7 * self.rules.max_iterations))
         # descents start where obstacles have moved to
         times = (route.acting(level)[1] for level in (0.0, 1.0))
@@ -373,7 +373,7 @@ class Search:
 
         try:
             with np.errstate(all="ignore"):
-                found = descent.descend(step, lambda begin: step.iterate(begin, far, down), down)
+                found = strategies.descend(step, lambda begin: step.iterate(begin, far, down), down)
                 if system.forces.contacts.obstacles:
                     found = self._with_stiff_contact(found, step)
         except NO_FACTORS as error:
@@ -405,7 +405,7 @@ class Search:
                 system.after(result.memory), result.u, result.multipliers):
             self._loose, self._unstabilised = "", self._unstabilised + 1
             try:  # from the last factors
-                for v, _ in descent.Descent(system).directions(1):
+                for v, _ in strategies.Descent(system).directions(1):
                     self._loose = stability.motion_in_words(system, result.u, v)
             except NO_FACTORS:
                 pass
@@ -464,7 +464,7 @@ class Search:
                     logger.info("load %.6g failed (%s), step cut", load, failure)
                     size, found = 0.25 * (load - result.load), None
                     many = few and spent + step.record.iterations >= FEW * patience
-                    if stable and (cuts > descent.CUTS or size < rules.min_step or many):
+                    if stable and (cuts > strategies.CUTS or size < rules.min_step or many):
                         found = step.rescue(failure)
                     none = few and not result.steps and result.rejected > CUT
                     none = none or self._exhausted

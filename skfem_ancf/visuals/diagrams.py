@@ -11,8 +11,7 @@ from ..core import Array, StrPath, refuse, require_flag, require_like, require_o
 from ..recovery.fields import units_of, with_unit
 from ..recovery.grids import grids
 from .matplotlib import dress, new_axes, page
-from .scenery import GHOST, INK, MUTED, rounded, unit_of_resultant
-from .symbols import Sketch, symbols_of
+from .scenery import GHOST, INK, MUTED, Sketch, rounded, symbols_of, unit_of_resultant
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
 

@@ -17,8 +17,8 @@ from ..core import (ArrayLike, InputError, StrPath, refuse, require_flag, requir
 from ..core.archive import output_file
 from ..recovery.fields import FIELDS, unit_of, units_of
 from ..recovery.grids import layout
-from .scenery import BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, rounded
-from .symbols import LOAD, Sketch, symbols_of
+from .scenery import (BODIES, GHOST, INK, LOAD, MUTED, RIGID, WALL, WIDE, Scenery, Sketch, rounded,
+                      symbols_of)
 
 #: Largest resolution of a file, in dots per inch.
 MAX_DPI = 2400
