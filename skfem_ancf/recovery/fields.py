@@ -225,6 +225,8 @@ class Values(Mapping):
 
     def _by_history(self, ask, other):
         """A field (n,) of ``ask(material, history)``; ``other`` where a material has none."""
+        if not self._remembers:
+            return np.full(self.n, other)
         return by_history(self.beam, self._part.e, self._part.X, ask, other)
 
     def output(self, name: str, other: float = 0.0) -> Array:
@@ -237,11 +239,10 @@ class Values(Mapping):
         other
             Value where a material does not have it.
         """
-        if not self._remembers:
-            return np.full(self.n, other)
-        S = stretched(self.strain[0])[0] * self.S if self.cable else self.S
         return self._by_history(lambda law, history: law.outputs(
-            self.elastic, history, S).get(name, np.full(self.n, other)), other)
+            self.elastic, history,
+            stretched(self.strain[0])[0] * self.S if self.cable else self.S,
+            ).get(name, np.full(self.n, other)), other)
 
     def variable(self, name: str, components: int = 1) -> Array:
         """A history variable of materials, (n,) or (components, n); zero where there is none.
@@ -252,12 +253,9 @@ class Values(Mapping):
             Its name and number of components in ``variables`` of a
             :class:`~skfem_ancf.materials.HistoryMaterial`.
         """
-        def of(k):
-            return np.zeros(self.n) if not self._remembers else self._by_history(
-                lambda law, history: history[law.rows(name)][k] if name in law.variables else
-                np.zeros(self.n), 0.0)
-
-        found = np.array([of(k) for k in range(components)])
+        found = np.array([self._by_history(
+            lambda law, history, k=k: history[law.rows(name)][k] if name in law.variables else
+            np.zeros(self.n), 0.0) for k in range(components)])
         return found[0] if components == 1 else found
 
     def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:

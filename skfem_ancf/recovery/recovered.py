@@ -244,7 +244,8 @@ class Segment:
 
     def at_axis(self, values: Array) -> Array:
         """Values (..., n, m) on the axis, (..., n)."""
-        return (values * self.points.axis).sum(axis=-1)
+        axis = self.points.axis
+        return values @ axis if axis.ndim == 1 else (values * axis).sum(axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """Integral from the axis of the axial derivative at constant distance from it, for values

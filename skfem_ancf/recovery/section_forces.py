@@ -60,15 +60,18 @@ class ArcLength:
     """Arc length along the reference axis; ``nodes`` (ne + 1,) at ends of elements."""
 
     def __init__(self, beam: Beam) -> None:
-        x, w = gauss(ALONG)
-        speed = np.hypot(*beam.mesh.mapping().DF(np.array([x, 0.5 + 0.0 * x]))[:, 0])
-        series = np.linalg.solve(chebvander(2.0 * x - 1.0, ALONG - 1), speed.T)
-        self._inside = chebint(series, lbnd=-1.0, scl=0.5).T
-        self.nodes = np.append(0.0, np.cumsum(speed @ w))
+        self._inside, lengths, (x, w) = None, beam.mesh.lengths, gauss(ALONG)
+        if not beam.mesh.is_straight:
+            speed = np.hypot(*beam.mesh.mapping().DF(np.array([x, 0.5 + 0.0 * x]))[:, 0])
+            series = np.linalg.solve(chebvander(2.0 * x - 1.0, ALONG - 1), speed.T)
+            self._inside, lengths = chebint(series, lbnd=-1.0, scl=0.5).T, speed @ w
+        self.nodes = np.append(0.0, np.cumsum(lengths))
 
     def at(self, e: Array, xi: Array) -> Array:
         """Arc length at xi of elements e, both of shape (n,)."""
-        return self.nodes[e] + (chebvander(2.0 * xi - 1.0, ALONG) * self._inside[e]).sum(axis=-1)
+        return self.nodes[e] + (
+            xi * (self.nodes[e + 1] - self.nodes[e]) if self._inside is None else
+            (chebvander(2.0 * xi - 1.0, ALONG) * self._inside[e]).sum(axis=-1))
 
 
 class Interval(NamedTuple):
@@ -146,6 +149,9 @@ class Intervals:
         self.moves = self._measures[0].moves
         faces = np.array([self._low[0], self._high[-1]])
         self.from_bottom, (_, self.whole) = self._integrals(self.eta), self._integrals(faces)
+        middle = np.array([0.5])
+        self._fixed = AcrossPoints(self.eta, 1.0, 0.0, 0.0, self.weights(middle)[0],
+                                   self._integrals(middle)[0])
         self.bottom, self.top = self.weights(faces)
 
     def _which(self, eta):
@@ -175,10 +181,8 @@ class Intervals:
 
     def points(self, h: Array) -> AcrossPoints:
         """The points of sections of heights h (n,)."""
-        middle = np.array([0.5])
         if not self.moves:
-            return AcrossPoints(self.eta, 1.0, 0.0, 0.0, self.weights(middle)[0],
-                                self._integrals(middle)[0])
+            return self._fixed
         of = np.repeat(np.arange(len(self._low)), [len(i.nodes) for i in self._intervals])
         size = (self._high - self._low)[of]
         z = (self.eta - self._low[of]) / size
