@@ -152,9 +152,7 @@ def report(state: Any, filename: StrPath, title: str | None = None) -> Path:
     >>> state.report("girder.html").name  # doctest: +SKIP
     'girder.html'
     """
-    path = require_path("filename", filename, (".html", ".htm"))
-    title = require_text("title", title)
-    return _written(path, path.stem if title is None else title, _Page(state).parts())
+    return _written(filename, title, lambda: _Page(state).parts())
 
 
 def report_of_history(history: Any, filename: StrPath, title: str | None = None) -> Path:
@@ -171,29 +169,34 @@ def report_of_history(history: Any, filename: StrPath, title: str | None = None)
     filename, title
         As for a State.
     """
-    path = require_path("filename", filename, (".html", ".htm"))
-    title = require_text("title", title)
-    chosen = np.unique(np.linspace(0, len(history) - 1, min(len(history), INSTANTS)).astype(int))
-    states = list(history.states(chosen.tolist()))
-    strong = has_strength(states[0])
-    size = [one.extremes("utilisation" if strong else "displacement", 1)[0].value
-            for one in states]
-    state = states[int(np.argmax(size))]
-    about = (f"t = {history.t[0]:g} to {history.t[-1]:g}, {history.steps} steps by "
-             f"{history.scheme!r}. What follows is the instant t = {state.t:g}, of the largest "
-             f"{'utilisation' if strong else 'displacement'} of {len(chosen)} instants.")
-    sensors = [_figure(lambda name=name: history.plot_curve("t", name, xlabel="time"))
-               for name, values in history.sensors.items() if values.ndim == 1]
-    parts = ["<h2>Motion</h2>", _text(about), _figure(lambda: history_picture(history)), *sensors]
-    return _written(path, path.stem if title is None else title, [*parts, *_Page(state).parts()])
+    def parts():
+        n = len(history)
+        chosen = np.unique(np.linspace(0, n - 1, min(n, INSTANTS)).astype(int))
+        states = list(history.states(chosen.tolist()))
+        by = "utilisation" if has_strength(states[0]) else "displacement"
+        state = max(states, key=lambda one: one.extremes(by, 1)[0].value)
+        yield "<h2>Motion</h2>"
+        yield _text(f"t = {history.t[0]:g} to {history.t[-1]:g}, {history.steps} steps by "
+                    f"{history.scheme!r}. What follows is the instant t = {state.t:g}, of the "
+                    f"largest {by} of {len(chosen)} instants.")
+        yield _figure(lambda: history_picture(history))
+        for name, values in history.sensors.items():
+            if values.ndim == 1:
+                yield _figure(partial(history.plot_curve, "t", name, xlabel="time"))
+        yield from _Page(state).parts()
+
+    return _written(filename, title, parts)
 
 
-def _written(path, title, parts):
-    name = html.escape(title)
+def _written(filename, title, parts):
+    """Write what a function returns, after the checks of file and title."""
+    path, title = require_path("filename", filename, (".html", ".htm")), require_text(
+        "title", title)
+    name = html.escape(path.stem if title is None else title)
     page = (f"<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
             f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
             f"<style>{STYLE}</style></head>\n<body><h1>{name}</h1>\n" + "\n".join(
-                part for part in parts if part) + "\n</body></html>\n")
+                part for part in parts() if part) + "\n</body></html>\n")
     with output_file(path) as temporary:
         Path(temporary).write_text(page, encoding="utf-8")
     return path

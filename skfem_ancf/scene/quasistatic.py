@@ -348,33 +348,30 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     search = Search(system, last.result.u, last.result.memory, rules, stable, False,
                     t - last.t)
     bounded = search.touches or search.stabilised_by_loads
-    for method in ("mixed", "descent" if bounded else "newton"):
+    for method in ("mixed", "descent" if bounded else "newton", *["all"] * smallest):
         try:
-            if method == "descent":
+            if method == "all":
+                logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
+                result = search.find()
+                method = result.attempts[-1].strategy
+                result.rubbed += last.result.rubbed
+            elif method == "descent":
                 result = search.descent(most=BOUNDED)
+                result.rubbed += last.result.rubbed
             else:
                 step = Increment(system, start, 1.0, Options(
                     route, method, rules.tol, rules.max_iterations, method == "mixed", True))
-                result = step.reached(step.solve(stable))
+                with np.errstate(all="ignore"):  # overflow shows in the residual
+                    result = step.reached(step.solve(stable))
         except LoadStepFailed as failure:
             failed = failure
             continue
         moved = largest_displacement(system, result.u - last.result.u)
-        if moved > far and not smallest:
-            failed = LoadStepFailed(f"a node moves by {moved:.3g}")
-            continue
-        if method == "descent":
-            result.rubbed += last.result.rubbed
-        found_by = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
-        return Instant(t, result, found_by, moved / (t - last.t))
-    if not smallest:
-        raise failed
-    logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
-    result = search.find()
-    result.rubbed += last.result.rubbed
-    moved = largest_displacement(system, result.u - last.result.u)
-    found_by = FOLLOWED if moved <= far else f"{JUMPED} by {result.attempts[-1].strategy}"
-    return Instant(t, result, found_by, moved / (t - last.t))
+        if moved <= far or smallest:
+            return Instant(t, result, FOLLOWED if moved <= far else f"{JUMPED} by {method}",
+                           moved / (t - last.t))
+        failed = LoadStepFailed(f"a node moves by {moved:.3g}")
+    raise failed
 
 
 def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticResult,
