@@ -42,7 +42,7 @@ def first_order(z: Any) -> Any:
 def largest(z: Array, axis: Any = None) -> Any:
     """Largest modulus, along axes; at a :func:`step` that of the change, without round-off."""
     change = z.imag / STEP if z.dtype.kind == "c" else z
-    return np.abs(change).max(axis=axis)
+    return np.maximum.reduce(np.abs(change), axis=axis)
 
 
 def angle_of(x: Any, y: Any) -> Any:

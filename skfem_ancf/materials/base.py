@@ -364,8 +364,8 @@ class LinearLaw:
     def stress(self, strain: Array) -> Array:
         strain = np.asarray(strain)
         if strain.ndim == 1:
-            return self.D.dot(strain)
-        return self.D.dot(strain.reshape(3, -1)).reshape(strain.shape)
+            return self.D @ strain
+        return (self.D @ strain.reshape(3, -1)).reshape(strain.shape)
 
     def moduli(self, strain: Array) -> Array:
         shape = np.shape(strain)[1:]

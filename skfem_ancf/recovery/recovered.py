@@ -73,6 +73,8 @@ def _by_rows(function):
     """A linear function of real values (n, k) as one of (..., n, m), which may be complex."""
     @wraps(function)
     def applied(self, values):
+        if values.ndim == 2 and values.dtype == float:
+            return function(self, values)
         rows = np.ascontiguousarray(values.swapaxes(0, -2))
         found = function(self, rows.reshape(len(rows), -1).view(float))
         return np.ascontiguousarray(found).view(rows.dtype).reshape(rows.shape).swapaxes(0, -2)
@@ -219,10 +221,14 @@ class Segment:
 
     # along the axis and across
 
-    def spline(self, values: Array) -> Any:
-        """Cubic spline through values (n, ...) at the sections."""
-        return scipy.interpolate.make_interp_spline(self.s, values, min(3, len(self.s) - 1),
-                                                    check_finite=False)
+    def splined(self, values: Array, slopes: Array, s: Array) -> Array:
+        """Cubic spline at s (k,) of values and slopes (..., n, m) at the sections, (..., k, m)."""
+        j = np.minimum(np.maximum(self.s.searchsorted(s, side="right") - 1, 0), len(self.s) - 2)
+        d = self.along.d[j][:, None]
+        t = (s - self.s[j])[:, None] / d
+        (a, b), (u, v) = ((x[..., j, :], x[..., j + 1, :]) for x in (values, slopes))
+        return a + t * (d * u + t * (3.0 * (b - a) - d * (2.0 * u + v)
+                                     + t * (2.0 * (a - b) + d * (u + v))))
 
     def across(self, values: Any) -> Array:
         """Integral over the height of values (..., n, m)."""
@@ -420,9 +426,9 @@ class Segment:
 
     @cached_property
     def result(self) -> Any:
-        """Spline of strain, stress and angle, with values (7, m)."""
-        return self.spline(first_order(np.concatenate(
-            [self.strain, self.stress, self.angle[None]])).swapaxes(0, 1))
+        """Strain, stress and angle, (7, n, m), and their slopes."""
+        found = first_order(np.concatenate([self.strain, self.stress, self.angle[None]]))
+        return found, self.along.d_ds(found)
 
 
 DIVERGED = "the strain is too large: no equilibrium of the section was found"
@@ -446,7 +452,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array,
     if isinstance(law, LinearLaw):
         gap, some = stress - law.stress(strain), slice(unknown[0], unknown[-1] + 1)
         strain, C = strain.astype(gap.dtype), law.compliance(unknown)
-        strain[some] += C.dot(gap[some].reshape(C.shape[1], -1)).reshape(gap[some].shape)
+        strain[some] += (C @ gap[some].reshape(C.shape[1], -1)).reshape(gap[some].shape)
         return strain
     k = list(unknown)
     strain = np.array(strain, dtype=np.result_type(strain, stress, float))
@@ -486,7 +492,8 @@ class Recovery:
         if forces.small or not beam.has_sections:  # linearised laws; a cable has no others
             laws = [law if isinstance(law, LinearLaw) else LinearLaw(law.moduli(np.zeros(3)))
                     for law in laws]
-        self.laws = list(zip(self.intervals.layers, laws))
+        self.laws, self._law = list(zip(self.intervals.layers, laws)), (
+            laws[0] if len(laws) == 1 else None)
         self.linear = all(isinstance(law, LinearLaw) for law in laws)
         self.arc = ArcLength(beam)
         #: Mapping with sections that follow the axis at jumps of the curvature.
@@ -551,8 +558,8 @@ class Recovery:
 
     def by_law(self, function: Callable[..., Array], *fields: Array) -> Array:
         """``function(law, *fields)`` with the law of each point, for fields (..., n, m)."""
-        if len(self.laws) == 1:
-            return function(self.laws[0][1], *fields)
+        if self._law is not None:
+            return function(self._law, *fields)
         return np.concatenate([function(law, *(f[..., columns] for f in fields))
                                for columns, law in self.laws], axis=-1)
 
@@ -605,6 +612,7 @@ class Recovery:
         out = np.empty((len(range(*rows.indices(7))), len(s)))
         for k in np.unique(segment):
             on = segment == k
-            values = self.segments[k].result(s[on])[:, rows]
-            out[:, on] = (values @ weights[on][..., None])[..., 0].T
+            one = self.segments[k]
+            values = one.splined(*(x[rows] for x in one.result), s[on])
+            out[:, on] = (values * weights[on]).sum(axis=-1)
         return out

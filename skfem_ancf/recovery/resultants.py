@@ -237,7 +237,8 @@ def _recovered(recovery, u, e, xi, after):
         start = (one.g[:, 0] - one.g[:, -1]) / (one.Y[..., -1] - one.Y[..., 0])
         curvature = one.rate - start - one.along.d_ds(shear[:, None])[:, 0]
         values = np.array([phi, one.at_axis(stretch), shear, curvature])
-        out[:, on] = one.spline(values.T)(s[on]).T
+        values = values[..., None]
+        out[:, on] = one.splined(values, one.along.d_ds(values), s[on])[..., 0]
     return _result(R, M, *out)
 
 

@@ -217,8 +217,8 @@ class Sections:
     def __init__(self, beam: Beam, e: Array, xi: Array, eta: Any = 0.5,
                  lifted: bool = False, mapping: MappingBeam | None = None) -> None:
         self.beam, self.e, eta = beam, e, np.atleast_1d(eta)
-        shape = len(e), eta.shape[-1]
-        self.X = np.array([np.broadcast_to(xi[:, None], shape), np.broadcast_to(eta, shape)])
+        self.X = np.empty((2, len(e), eta.shape[-1]))
+        self.X[0], self.X[1] = xi[:, None], eta
         self._mapping = mapping or beam.mesh.mapping()
         self._arm = beam.mesh.mapping().offset(self.X, e) / np.hypot(
             *Sections(beam, e, xi).J[:, 0]) if lifted else None

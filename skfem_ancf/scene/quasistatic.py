@@ -348,7 +348,7 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     search = Search(system, last.result.u, last.result.memory, rules, stable, False,
                     t - last.t)
     bounded = search.touches or search.stabilised_by_loads
-    for method in ("mixed", "descent" if bounded else "newton", *["all"] * smallest):
+    for method in ("mixed", "descent" if bounded else "newton", *(("all",) if smallest else ())):
         try:
             if method == "all":
                 logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
