@@ -76,8 +76,7 @@ class Sampled:
         return np.append(np.nonzero(on[1:] != on[:-1])[0] + 1.0, inside)
 
     def jumps(self, nelements: int) -> Array:
-        """Axial coordinates of jumps by more than a tenth of the largest value; others are errors.
-        """
+        """Axial coordinates of jumps by more than a tenth of the largest value."""
         eta = np.array([0.0]) if self.eta is None else self.eta
         return jumps(lambda X, e: self.at(e, X[0, :, 0], X[1], nelements), nelements, eta,
                      0.1 * float(np.max(np.abs(self.values), initial=0.0)))

@@ -516,8 +516,7 @@ def grade_of(domain: Domain, x: Array) -> Any:
 
 
 def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array, Array]:
-    """Points (2, n), their displacement and its gradient (2, 2, n), and triangles or quads, with
-    ``parts`` refinements of each cell, for plots."""
+    """For plots points (2, n), displacement and gradient (2, 2, n), and triangles or quads."""
     mesh, basis = domain.basis.mesh, domain.basis
     cell = mesh.init_refdom().refined(parts)
     x = np.asarray(basis.mapping.F(cell.p))

@@ -67,8 +67,7 @@ def has_history(beam: Any, k: int) -> bool:
 
 def by_history(beam: Any, e: Array, X: Array, ask: Callable[[Any, Array], Array],
                other: float) -> Array:
-    """A field (n,) of materials and their histories (k, n) at points; ``other`` without a history.
-    """
+    """A field (n,) of materials and histories (k, n) at points; ``other`` without a history."""
     like = np.zeros((len(e), 1))
 
     def of(k):

@@ -20,8 +20,7 @@ def tensor(S: Array) -> Array:
 
 
 def moduli_at(law: Any, F: Array, strain: Array) -> Array:
-    """Derivatives (2, 2, 2, 2, ...) of the first Piola-Kirchhoff stress by F (2, 2, ...), at the
-    Green-Lagrange strain (3, ...), in one frame."""
+    """Derivatives (2, 2, 2, 2, ...) of the first Piola-Kirchhoff stress by F, at a Green strain."""
     k = np.array([[0, 2], [2, 1]])
     D = law.moduli(strain)[k][:, :, k]
     A = np.einsum("iI...,IJKL...,kK...->iJkL...", F, D, F, optimize=True)

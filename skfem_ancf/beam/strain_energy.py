@@ -241,8 +241,7 @@ def put_eigenstrains(body, given):
 
 @source
 def add_eigen_force(body, u, v, given, f):
-    """Add the change of the force at u, or with v of the mean from u to v, by eigenstrains, see
-    :func:`eigenstrain_body_of`."""
+    """Add the change by eigenstrains of the force at u, or with v of the mean from u to v."""
     for k in range(body.table.shape[0]):
         run_eigen_force(tables_of(body, k), u, v, _stress(body, k, given), f)
 

@@ -215,8 +215,7 @@ class CondensedMass:
         self._condensed.factorize(self.at, 0.0 * self._condensed.at[1])
 
     def forget(self, factors: bool = True) -> None:
-        """Discard the last solution and, by default, the factors, so that results do not depend on
-        them."""
+        """Discard the last solution and, by default, the factors: results do not depend on them."""
         self._last = None
         if factors:
             self.at = None

@@ -153,8 +153,8 @@ class Histories:
         return self.get()
 
     def of_state(self, state: Any) -> Array | None:
-        """The history of a State, or None: that of obstacles, springs and items that its scene has
-        as well, and of beams, whose materials must be of the same kinds."""
+        """The history of a State, as far as its scene has the same items and kinds of laws, or
+        None."""
         if state is None or state.memory is None:
             return None
         theirs = state.system.histories

@@ -49,8 +49,7 @@ def first_dependent(J: Array | sparse.csr_array, free: Array,
 
 
 def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield row numbers, numbers of nonzero columns and dense submatrices of the groups of rows of
-    a sparse matrix that have no common column; a dense matrix is one group."""
+    """Yield rows, columns and dense submatrices of groups of rows without a common column."""
     if isinstance(J, np.ndarray):
         columns, = J.any(axis=0).nonzero()
         if len(J):
@@ -104,8 +103,7 @@ def _members(group, number):
 
 
 def inertia_of(A: Array | sparse.csr_array) -> Inertia:
-    """The :class:`~skfem_ancf.core.band.Inertia` of a symmetric matrix, a sparse one by the pivots
-    of ``L D L^T`` (Sylvester's law); LinAlgError if it has no factors with diagonal pivots."""
+    """The Inertia of a symmetric matrix, by pivots if it is sparse; LinAlgError if these fail."""
     size = np.abs(A.diagonal())
     if not len(size):
         return Inertia(0, False)

@@ -215,8 +215,7 @@ class System:
         return other
 
     def sticking(self) -> System:
-        """The equations in whose tangents all points that touch an obstacle stick, see
-        :meth:`~skfem_ancf.actions.contact.contacts.Contacts.stick`."""
+        """The equations in whose tangents all points that touch an obstacle stick."""
         if not self.forces.contacts.anchored:
             return self
         other = self.after(self.histories.values, float(self.histories.span[0]))
@@ -261,8 +260,7 @@ class System:
     # loads
 
     def at(self, t: float) -> System:
-        """The equations in which functions of time are those at t in statics; all else is shared.
-        """
+        """The equations in which functions of time are those at t in statics."""
         other = object.__new__(System)
         vars(other).update(vars(self), clock=t, backend=self.backend, solver=self.solver,
                            _whole=self._whole or self)

@@ -172,8 +172,7 @@ class Tables:
 
     @cached_property
     def linearised(self) -> "Tables | None":
-        """Tables with the linearised laws at zero strain; None if all laws are linear, or
-        one has a history."""
+        """Tables with the laws at zero strain; None if all are linear, or one has a history."""
         body = self.plain.body
         kinds = {t.law.kind for t in body.packs}
         if kinds <= {LINEAR} or HISTORY in kinds:

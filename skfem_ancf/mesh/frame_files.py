@@ -29,8 +29,7 @@ UNITS = "m", "mm", "cm", "dm", "km", "in", "ft", "yd"
 
 
 def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
-    """The lines and points of a drawing as a meshio mesh, cell sets named after their layers; None
-    takes coordinates as drawn."""
+    """Lines and points of a drawing as a meshio mesh, with a cell set for each layer."""
     import meshio
 
     ezdxf = require_module("ezdxf", "dxf")

@@ -70,8 +70,7 @@ def _values(height, s):
 
 def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
-    """As :func:`~.mapping.heights_of`, for a number, a function, or a list with one for each chain.
-    """
+    """As :func:`~.mapping.heights_of`, for a number, a function, or a list for the chains."""
     chain = chain_of(s)
     local = s - 2.0 * chain
     if not isinstance(height, list):
@@ -267,8 +266,7 @@ class FrameGraph:
         return float(np.max(np.ptp(self.points, axis=1)))
 
     def nodes_at(self, place: Any) -> Array:
-        """Numbers of the nodes at one of :data:`PLACES`, an array of numbers or of points, shape
-        (k,), k >= 1."""
+        """Numbers (k,) of the nodes at one of :data:`PLACES`, at numbers or at points, k >= 1."""
         found = self.same[self.points_at(place)]
         return found if len(found) == 1 else np.unique(found)
 
@@ -317,8 +315,7 @@ class FrameGraph:
                                          self.lines.shape[1] - 1)])
 
     def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
-        """A mesh with one chain for each of the lines (k,); ``elements`` (m,) are the numbers for
-        every line."""
+        """A mesh with a chain for each of the lines (k,), of ``elements`` (m,) for every line."""
         n = elements[lines]
         first = np.concatenate([[0], np.cumsum(n + 1)])
         line = np.repeat(np.arange(len(lines)), n + 1)

@@ -272,8 +272,7 @@ class MappingBeam(Mapping):
         return Inverse(start, axis, director, self.mesh.height, self.heights)
 
     def invF(self, x: Array, tind: Array | None = None) -> Array:
-        """Reference points of points x, also outside the cell, (2, nelements, npoints) both; or
-        NaN."""
+        """Reference points of points x (2, nelements, npoints), also outside the cell; or NaN."""
         return self.inverse(x, slice(None) if tind is None else tind)
 
     # facets

@@ -213,8 +213,7 @@ def halved(mesh: Any, ix: Array) -> Any:
 
 
 def by_element(mesh: Any, at: Array) -> Any:
-    """A curved mesh of disconnected elements, with one-sided rates of turning at nodes ``at`` (k,).
-    """
+    """A mesh of disconnected elements, with one-sided rates of turning at nodes ``at`` (k,)."""
     # cubic and higher directors share one nodal derivative, which fits neither side of a jump of
     # the curvature
     mesh, n, node = mesh.with_sections("cubic"), mesh.nelements, mesh.t.T.ravel()

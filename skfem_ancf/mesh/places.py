@@ -55,8 +55,7 @@ class Inverse:
         return self.largest * polyval(xi, self.heights[:, e, None], tensor=False)
 
     def __call__(self, x: Array, e: Any) -> Array:
-        """Reference points of points of elements e, both (2, n, npoints), by Newton's method; or
-        NaN."""
+        """Reference points of points (2, n, npoints) of elements e, by Newton's method; or NaN."""
         axis, director, crossed = (
             c[..., e, None] for c in (self.axis, self.director, self.crossed))
         gap = x - self.start[:, e, None]
@@ -235,8 +234,7 @@ class Finder:
 
     @cached_property
     def _line(self):
-        """Tangent and normal of a single straight line, and where it and its elements begin; or
-        None."""
+        """Tangent, normal, begin and begins of elements of a single straight line, or None."""
         mesh, first = self.mesh, self.mesh.p[:, :1]
         if not (self.is_chain and (mesh.is_uniform or mesh.is_straight and np.abs(
                 mesh.p_X - mesh.p_X[:, :1]).max() < 1e-9)):
@@ -262,8 +260,7 @@ KINDS = ("the name of a boundary, a material point (x, y), a function of the poi
 
 
 def is_point(place: object) -> bool:
-    """True for two numbers in a tuple, a list or an array of floats; integers of an array are
-    facets."""
+    """True for two numbers; integers of an array are facets."""
     if isinstance(place, np.ndarray):
         return place.shape == (2,) and place.dtype.kind == "f"
     return (isinstance(place, (tuple, list)) and len(place) == 2

@@ -595,8 +595,7 @@ class DomainValues(Values):
 
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
-    """Values at points (xi, eta) of all elements, (2, npoints) or (2, nelements, npoints),
-    flattened."""
+    """Values at points (xi, eta) of all elements, (2, [nelements,] npoints), flattened."""
     ne = beam.mesh.nelements
     part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
                       np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1))

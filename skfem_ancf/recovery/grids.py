@@ -117,8 +117,7 @@ def quads(m: int, n: int) -> Array:
 
 
 def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
-    """Points (2, npoints) and quads of an element with m and n intervals along and across; for
-    intervals that vary along the axis (2, nelements, npoints)."""
+    """Points (2, [nelements,] npoints) and quads of an element with m and n intervals."""
     # each interval of the section has at least one cell, with points on both sides of jumps
     sizes = np.diff(beam.across.ends())
     if len(sizes) == 1:

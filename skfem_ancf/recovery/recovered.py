@@ -254,8 +254,8 @@ class Segment:
         return values @ axis if axis.ndim == 1 else (values * axis).sum(axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
-        """Integral from the axis of the axial derivative at constant distance from it, for values
-        (..., n, m) at constant relative positions."""
+        """Integral from the axis of the axial derivative, for values (..., n, m) at equal heights.
+        """
         lean = self.lean * values
         return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]
 
@@ -274,8 +274,7 @@ class Segment:
         return np.array([size * longer, size * eps[1], eps[2]]), P / self.stretch
 
     def _section(self):
-        """Set strain, r_X, r_Y and the stress P on sections, along t and n, from S_yy, S_xy and
-        stretch."""
+        """Set strain, r_X, r_Y and the stress P on sections, from S_yy, S_xy and stretch."""
         r = self.recovery
         if self.stress_given:
             eps = self.E0 + r.strain_of(self.S / self.grade, self.eps - self.E0)
@@ -447,8 +446,7 @@ def _turned(f, angle):
 def strain_of_stress(law: Law, stress: Array, strain: Array,
                      unknown: tuple[int, ...] = (0, 1, 2),
                      tol: float = 1e-10) -> Array:
-    """The strain (3, ...) with a given stress under a law, by Newton's method for the ``unknown``
-    components."""
+    """The strain (3, ...) with a given stress under a law, by its ``unknown`` components."""
     if isinstance(law, LinearLaw):
         gap, some = stress - law.stress(strain), slice(unknown[0], unknown[-1] + 1)
         strain, C = strain.astype(gap.dtype), law.compliance(unknown)
@@ -588,7 +586,7 @@ class Recovery:
         return x, stress
 
     def segment_of(self, e: Array, xi: Array, after: Any = False) -> Array:
-        """Segment numbers of sections, (n,); those at a cut inside an element are before it, or
+        """Segment numbers (n,) of sections; at a cut inside an element that before it, or
         ``after``."""
         cuts = self.forces.cuts
         at_node = np.minimum(xi, 1.0 - xi) < SNAP

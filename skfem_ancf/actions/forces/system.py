@@ -196,8 +196,8 @@ class Forces:
         self._border, self.border_rows = (len(rows) * a + b, number[out]), B[rows].toarray()
 
     def after(self, memory: Array, pasts: Sequence[tuple[Array, Array]]) -> Forces:
-        """A copy with a history of obstacles and springs, and histories and spans of the items
-        with a memory: arrays that it uses, and changes where it accepts an increment."""
+        """A copy with a history of obstacles and springs, and pasts (arrays that it uses) of items.
+        """
         other, new = copy(self), [one.after(*past) for one, past in zip(self.remembering, pasts)]
         of = dict(zip(map(id, self.remembering), new))
         other.remembering, other.custom = new, [of.get(id(e), e) for e in self.custom]
@@ -326,8 +326,8 @@ class Forces:
         return [item for item in self.remembering if not (idle and item.changing)]
 
     def take_over(self, other: Forces, u: Array, t: float) -> bool:
-        """Set the history to that of another scene with the same beams, at u and t, as far as it
-        has the same obstacles, springs and items; True if it has some."""
+        """Set the history to that of equal parts of another scene, at u and t; True if there are
+        any."""
         items = [*matched(self.remembering, other.remembering, lambda a, b: a.same(b), is_like)]
         for item, one in items:
             item.take_over(one)
@@ -398,8 +398,8 @@ class Forces:
         return None
 
     def moves_far(self, u: Array) -> Array:
-        """True for steps between displacements (n + 1, N) that may lead through a changing element,
-        (n,), however it is touched before and after."""
+        """True for steps between displacements (n + 1, N) that may lead through a changing element.
+        """
         way = np.max(np.abs(np.diff(u, axis=0)) * self.clear[SEEN + self._N:], axis=1)
         return way >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 

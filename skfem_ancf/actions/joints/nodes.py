@@ -288,8 +288,7 @@ class Nodes(Joint):
         return np.asarray(connected_components(links, directed=False)[1])
 
     def fixed_motions(self, parts: Array, origin: Array, size: float, number: int) -> Any:
-        """Constraints of nodes and supports on rigid motions of groups; dense for one group, else
-        sparse."""
+        """Constraints on rigid motions of groups; dense for one group, else sparse."""
         part = np.repeat(parts, 2)
         x, y = (self.graph.points[:, self.nodes] - origin[:, None]) / size
         one = np.ones(len(x))

@@ -207,8 +207,7 @@ class BodyContact(ForceElement):
         return Meeting(pairs, a, b, np.where(good, (a - b) / np.where(good, change, 1.0), 1.0), end)
 
     def _other(self, known, p, e, zeta, z):
-        """Place and penetration of pairs at a state with known ones; none of those that are apart.
-        """
+        """Place and penetration of known pairs at a state; none of those that are apart."""
         S, search = self.search.surfaces, self.search
         gap, at = np.full(len(S.shift), np.inf), np.full(len(S.shift), -1)
         gap[known.p], at[known.p] = known.gap, np.arange(len(known.p))

@@ -110,8 +110,7 @@ class Surfaces:
         return r + self.shift * n, self.facets.sides[self.facets.of] * n
 
     def project(self, x: Array, e: Array, zeta: Array, z: Array) -> tuple[Array, Array]:
-        """The closest point of facets e to places x, from a guess: zeta, and True if it is there.
-        """
+        """The closest point of facets e to places x, from a guess zeta; True where it is there."""
         f, zeta = self.facets, zeta.copy()
         curve = (f.starts[e] + np.einsum("nbk,nb->nk", f.weights[e], z[f.dofs[e]])).T
         slope = curve[1:] * np.arange(1.0, len(curve))[:, None]

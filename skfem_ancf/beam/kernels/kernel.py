@@ -200,8 +200,8 @@ class ElementKernel:
         return out
 
     def gradients(self, u: Array) -> tuple[Array, Array, Array]:
-        """B and HB, (ne, m, 2 nb), of the material tangents ``B^T HB`` with the stabilisation, and
-        the weighted stresses (ne, m); without cancellation in B."""
+        """B and HB, (ne, m, 2 nb), of tangents ``B^T HB``, and stresses (ne, m); no cancellation in
+        B."""
         u, ne, n = self._checked(u), self.t.shape[1], 2 * self.nd
         found, stresses = [], []
         for e in self.elements:
