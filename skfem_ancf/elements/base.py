@@ -46,8 +46,14 @@ class StabilisedMode(NamedTuple):
 
 
 def default_sampling(p: int, s: int) -> Sampling:
-    """Samples for axes of degree ``p`` and sections of degree ``s`` along X, by counting
-    constraints."""
+    """Samples for axes of degree ``p`` and sections of degree ``s``, by counting constraints."""
+    # An element of a chain adds one node with p + s + 2 unknowns. In the thin limit each sample is a
+    # constraint; neighbours share those at nodes. If no unknown is left the element locks; with
+    # fewer samples modes are missed (:func:`missed`) and must be stabilised. eps_xx, of degree
+    # 2 (p - 1), has p - 1 Gauss points; eps_yy the nodes, and between them the s Gauss-Lobatto
+    # points, zeros of the mode of the slope that eps_xx misses; eps_xy (s + 3) / 2 Gauss-Lobatto
+    # points where sections have the degree of the axis, else the points of eps_xx. Linear sections,
+    # p = 3 and s = 1, have 1 of 6 left, p = s = 3 has 2 of 8, p = s = 5 1 of 12.
     few = (s + 3) // 2
     if s < p:
         return Sampling(min(p - 1, (p + s + 2 - few) // 2), {"yy": _lobatto(few)},

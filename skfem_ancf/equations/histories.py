@@ -153,8 +153,7 @@ class Histories:
         return self.get()
 
     def of_state(self, state: Any) -> Array | None:
-        """The history of a State, as far as its scene has the same items and kinds of laws, or
-        None."""
+        """The history of a State, as far as items and kinds of laws are equal, or None."""
         if state is None or state.memory is None:
             return None
         theirs = state.system.histories

@@ -260,8 +260,7 @@ class Schur:
 # matrix T^T K T is symmetric if K is, and its pivots give the inertia
 
 def eliminated(A: Array) -> tuple[Array, Array, Array]:
-    """Pivots (g, k), reduced row echelon forms R of A (g, k, c), and M with ``M A = R``;
-    LinAlgError."""
+    """Pivots (g, k), row echelon forms R of A (g, k, c), and M with ``M A = R``; LinAlgError."""
     g, k, c = A.shape
     size = np.max(np.abs(A), axis=2, initial=0.0)
     if not np.all(size):

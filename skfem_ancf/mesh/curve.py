@@ -135,8 +135,8 @@ class Curve:
         return np.hypot(*d) @ w * (b - a)
 
     def elements(self, s: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Positions, tangents, lengths, turning, and curvature of sixteenths, of elements between
-        ``s``."""
+        """Positions, tangents, lengths, turning, curvature of sixteenths, between nodes at ``s``.
+        """
         a, step = s[:-1], np.diff(s)
         beside = s[1:-1] + ASIDE[:, None] * np.minimum(step[:-1], step[1:])
         gauss, w = _gauss_points(a, step)

@@ -254,8 +254,7 @@ class Segment:
         return values @ axis if axis.ndim == 1 else (values * axis).sum(axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
-        """Integral from the axis of the axial derivative, for values (..., n, m) at equal heights.
-        """
+        """Integral from the axis of the axial derivative of values (..., n, m)."""
         lean = self.lean * values
         return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]
 
@@ -586,8 +585,7 @@ class Recovery:
         return x, stress
 
     def segment_of(self, e: Array, xi: Array, after: Any = False) -> Array:
-        """Segment numbers (n,) of sections; at a cut inside an element that before it, or
-        ``after``."""
+        """Segment numbers (n,) of sections; at a cut that before it, or ``after``."""
         cuts = self.forces.cuts
         at_node = np.minimum(xi, 1.0 - xi) < SNAP
         place = e + np.where(at_node, np.round(xi), xi)

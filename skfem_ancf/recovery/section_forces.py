@@ -416,8 +416,7 @@ class SectionForces:
         return R, cross(q[:, 0].T - r, R) - _moments(q, left)
 
     def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
-        """Force (2, n) and moment (n,) of the right part on the left, for segments from ``begin``.
-        """
+        """Force (2, n) and moment (n,) of the right part on the left, for segments at ``begin``."""
         # the mean of equilibrium from both ends of the element; next to an unknown force inside it,
         # only the end on this side
         side = np.full(len(e), 0.5)

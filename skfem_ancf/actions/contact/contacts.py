@@ -512,8 +512,7 @@ def matched(ours: Iterable[Any], theirs: Iterable[Any],
 
 
 def take_over(ours: Contacts, theirs: Contacts, u: Array, t: float) -> bool:
-    """Give contacts the history of others, where these have it; elsewhere friction begins at u, t.
-    """
+    """Give contacts the history of others, where there is one; else friction begins at u, t."""
     def known(contacts, k):
         (which, _), pair = contacts.groups[k], contacts.pair(k)
         shape = contacts.obstacles[which].shape

@@ -196,8 +196,7 @@ class Forces:
         self._border, self.border_rows = (len(rows) * a + b, number[out]), B[rows].toarray()
 
     def after(self, memory: Array, pasts: Sequence[tuple[Array, Array]]) -> Forces:
-        """A copy with a history of obstacles and springs, and pasts (arrays that it uses) of items.
-        """
+        """A copy with a history of obstacles and springs, and pasts of items, which it uses."""
         other, new = copy(self), [one.after(*past) for one, past in zip(self.remembering, pasts)]
         of = dict(zip(map(id, self.remembering), new))
         other.remembering, other.custom = new, [of.get(id(e), e) for e in self.custom]
@@ -326,8 +325,8 @@ class Forces:
         return [item for item in self.remembering if not (idle and item.changing)]
 
     def take_over(self, other: Forces, u: Array, t: float) -> bool:
-        """Set the history to that of equal parts of another scene, at u and t; True if there are
-        any."""
+        """Set the history to that of equal parts of another scene at u, t; True if there are any.
+        """
         items = [*matched(self.remembering, other.remembering, lambda a, b: a.same(b), is_like)]
         for item, one in items:
             item.take_over(one)
@@ -398,8 +397,7 @@ class Forces:
         return None
 
     def moves_far(self, u: Array) -> Array:
-        """True for steps between displacements (n + 1, N) that may lead through a changing element.
-        """
+        """True for steps between displacements (n + 1, N) that may lead through an element."""
         way = np.max(np.abs(np.diff(u, axis=0)) * self.clear[SEEN + self._N:], axis=1)
         return way >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 

@@ -233,8 +233,7 @@ class Search:
 
 
     def entered(self, z0: Array, z1: Array) -> complex | None:
-        """A place where an axis, or the middle of a solid, enters a solid from z0 to z1, or None.
-        """
+        """A place where an axis, or the middle of a solid, enters a solid, z0 to z1, or None."""
         f, (ends, chains, s, members) = self.surfaces.facets, self._axes(z0, COARSE)
         solid = np.flatnonzero(~np.isin(f.members, members))  # edges of bodies and domains
         if not len(solid):

@@ -200,8 +200,7 @@ class ElementKernel:
         return out
 
     def gradients(self, u: Array) -> tuple[Array, Array, Array]:
-        """B and HB, (ne, m, 2 nb), of tangents ``B^T HB``, and stresses (ne, m); no cancellation in
-        B."""
+        """B, HB (ne, m, 2 nb) of tangents ``B^T HB``, stresses (ne, m); no cancellation in B."""
         u, ne, n = self._checked(u), self.t.shape[1], 2 * self.nd
         found, stresses = [], []
         for e in self.elements:
