@@ -47,7 +47,7 @@ class StabilisedMode(NamedTuple):
 
 def default_sampling(p: int, s: int) -> Sampling:
     """Samples for axes of degree ``p`` and sections of degree ``s``, by counting constraints."""
-    # An element of a chain adds one node with p + s + 2 unknowns. In the thin limit each sample is a
+    # An element of a chain adds one node with p + s + 2 unknowns. In the thin limit a sample is a
     # constraint; neighbours share those at nodes. If no unknown is left the element locks; with
     # fewer samples modes are missed (:func:`missed`) and must be stabilised. eps_xx, of degree
     # 2 (p - 1), has p - 1 Gauss points; eps_yy the nodes, and between them the s Gauss-Lobatto
