@@ -46,13 +46,16 @@ def reference_coordinates(basis: Basis) -> Array:
     element = getattr(basis.elem, "elem", None)
     refuse(not isinstance(basis.mesh, MeshBeam) or not isinstance(element, ElementBeam),
            "the basis must be one of ElementVector(element) on a MeshBeam, got {!r}", basis)
-    return _coordinates(basis.mesh, element, basis.mesh.p)
+    return _coordinates(basis.mesh, element, basis.mesh.p).copy()
 
 
 def _coordinates(mesh, element, p):
+    """Read-only DOFs (N,) of the reference configuration, with positions p (2, nvertices)."""
     q = element.rigid(mesh)
     q[0] = p
-    return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
+    q = q.transpose(2, 0, 1).reshape(-1)
+    q.flags.writeable = False
+    return q
 
 
 class Beam(Immutable):
@@ -220,7 +223,7 @@ class Beam(Immutable):
     @cached_property
     def q0(self) -> Array:
         """DOFs of the reference configuration, shape (N,)."""
-        return read_only(_coordinates(self.mesh, self.element, self.mesh.p))
+        return _coordinates(self.mesh, self.element, self.mesh.p)
 
     @cached_property
     def origin(self) -> Array:
@@ -230,8 +233,7 @@ class Beam(Immutable):
     @cached_property
     def q0_local(self) -> Array:
         """:attr:`q0` with positions relative to :attr:`origin`."""
-        return read_only(_coordinates(self.mesh, self.element,
-                                      self.mesh.p - self.origin[:, None]))
+        return _coordinates(self.mesh, self.element, self.mesh.p - self.origin[:, None])
 
     @property
     def dofnames(self) -> list[str]:

@@ -344,7 +344,8 @@ class Assumed(Formulation):
         out = np.zeros((len(L), 2 * n, 2, 2 * n, 2))
         out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = K.real
         if not straight:
-            out[:, :, 1, :, 0], out[:, :, 0, :, 1] = K.imag, -K.imag
+            out[:, :, 1, :, 0] = turning = 0.5 * (K.imag - K.imag.swapaxes(1, 2))
+            out[:, :, 0, :, 1] = -turning
         return out.reshape(len(L), 4 * n, 4 * n)
 
 

@@ -43,9 +43,10 @@ def _square(across):
 
 
 def _unit(element, points):
-    """Derivatives of the axis by xi at each point, the first and the second: (rows, nb)."""
+    """Derivatives of the axis by xi at each point, the first and the second, (rows, nb), and the
+    powers of the length with which they are those by X, (rows,)."""
     slopes = np.stack([element.axis(points, d).T for d in (1, 2)], axis=1)
-    return slopes.reshape(2 * len(points), -1)
+    return slopes.reshape(2 * len(points), -1), np.tile([-1.0, -2.0], len(points))
 
 
 @lru_cache(64)
@@ -100,18 +101,16 @@ class CableKernel(ElementKernel):
         """Tables of the reference element scaled by the lengths, for one or all elements."""
         ne, nb, n, w = mesh.nelements, self.nd, self.points_number, self._rule[1]
         L = (mesh.lengths[:1] if same else mesh.lengths)[:, None]
-        scale = np.empty((len(L), 2 * n))
-        scale[:, ::2], scale[:, 1::2] = 1.0 / L, 1.0 / L**2
-        unit = _unit_at_gauss(element, n) if self._rule is gauss(n) else _unit(element, self.points)
-        G = unit * (scale[:, :, None] * element.powers(1.0, L)[:, None])
+        unit, orders = (_unit_at_gauss(element, n) if self._rule is gauss(n) else
+                        _unit(element, self.points))
+        G = unit * (L**orders)[:, :, None] * element.powers(1.0, L)[:, None]
         EA, ES, EI = self._across.moments(
-            self.points, np.zeros(1, int) if same and self._across.constant else None)
+            self.points, np.zeros(1, int) if same and self._across.constant else None) * (w * L)
         moduli = [EA, EI, -ES] if ES.any() else [EA, EI]
         pattern, order = _samples(n, len(moduli))
-        H = np.concatenate([x * w for x in moduli], axis=1) * L
         #: Modulus times volume.
-        self.scale = float(H[:, :n].sum()) * (ne // len(H))
-        H = H.take(order, 1)
+        self.scale = float(EA.sum()) * (ne // len(EA))
+        H = np.concatenate(moduli, axis=1).take(order, 1)
         frame = self._frame(mesh, element, n, G)
         C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
              self.constant[:, 2:, 2:])
@@ -156,9 +155,9 @@ class CableKernel(ElementKernel):
     def _frame(self, mesh, element, n, G):
         """r_X and r_XX in the reference configuration, (1 or ne, rows, 2)."""
         if mesh.is_straight:
-            p, k = mesh.p, 1 if mesh.is_uniform else mesh.nelements
-            (left, right), frame = mesh.t[:, :k], np.zeros((k, 2 * n, 2))
-            frame[:, ::2] = ((p[:, right] - p[:, left]) / mesh.lengths[:k]).T[:, None]
+            left = mesh.t[0, :1] if mesh.is_uniform else mesh.t[0]
+            frame = np.zeros((len(left), 2 * n, 2))
+            frame[:, ::2] = mesh.p_X[:, left].T[:, None]
             return frame
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)

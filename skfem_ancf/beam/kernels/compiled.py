@@ -15,7 +15,7 @@ from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, Pattern, St
 
 #: Number of elements together.
 W = 16
-_NOTHING = np.zeros((0, 0, 0))
+_NOTHING, _NO_INTS = np.zeros((0, 0, 0)), np.zeros(0, np.int64)
 
 
 class CompiledPattern(NamedTuple):
@@ -91,10 +91,9 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
             [R[:, g[:n]], R[:, h[n:]] / R[:, g[n:]]], axis=1)
         frame, H = frame / R[:, :, None], H * sigma[:, a] * sigma[:, b]
         scales = _scales(D), _scales(sigma)
-    K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
-    P, Q, coupled = map(np.ascontiguousarray, (
-        *_products(G[0], pattern.products, own), _coupled(K, Z, D.shape[1])))
-    used = G.any(axis=0).ravel().astype(np.int64) if own else np.zeros(0, np.int64)
+    K, Z, coupled = _constant(each(t.C, OF_C), D)
+    P, Q = map(np.ascontiguousarray, _products(G[0], pattern.products, own))
+    used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
         compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
@@ -143,24 +142,20 @@ def _products(G, products, own):
             (both.take(two, 0) - both.take(opposite, 0)).compress(g != h, 1))
 
 
-def _symmetric_and_skew(C, D):
-    """K and Z of matrices C (k, 2 m, 2 m) for scaled unknowns."""
+def _constant(C, D):
+    """K and Z of matrices C (k, 2 m, 2 m) for scaled unknowns, and the functions k >= l that they
+    couple, with 1 if component x of one acts on y of the other."""
     if not len(C):
-        return _NOTHING, _NOTHING
+        return _NOTHING, _NOTHING, np.zeros((3, 0), np.int64)
     m = D.shape[1]
-    C = C.reshape(len(C), m, 2, m, 2) / (D[:, :, None, None, None] * D[:, None, None, :, None])
-    (i, j, *_), (a, b, *_) = _lower(m, 0), _lower(m, -1)
-    one, two = C[:, :, 0, :, 1], C[:, :, 1, :, 0]
-    K = np.stack([C[:, i, 0, j, 0], C[:, i, 1, j, 1], 0.5 * (one + two)[:, i, j]], axis=2)
-    return _blocks(K), _blocks(0.5 * (one - two)[:, a, b])
-
-
-def _coupled(K, Z, m):
-    """Functions k >= l that K and Z couple, and 1 if component x of one acts on y of the other."""
-    if not len(K):
-        return np.zeros((3, 0), np.int64)
     k, l, *_ = _lower(m, 0)
-    both = K.any(axis=0).reshape(len(k), 3, W).any(axis=2)
-    both[k != l, 2] |= Z.any(axis=(0, 2))
-    used = both.any(axis=1)
-    return np.array([k, l, both[:, 2]], np.int64)[:, used]
+    C = C.reshape(len(C), m, 2, m, 2)
+    if len(D) > 1:
+        C = C / (D[:, :, None, None, None] * D[:, None, None, :, None])
+    C = C[:, k, :, l]
+    one, two = 0.5 * C[..., 0, 1], 0.5 * C[..., 1, 0]
+    K, Z = np.array([C[..., 0, 0], C[..., 1, 1], one + two]).transpose(2, 1, 0), one - two
+    used = K.any(axis=0)
+    used[:, 2] |= Z.any(axis=1) & (k != l)
+    coupled = np.array([k, l, used[:, 2]], np.int64).compress(used.any(axis=1), 1)
+    return _blocks(K), _blocks(Z.T.compress(k != l, 1)), coupled
