@@ -109,6 +109,10 @@ class SectionFunctions:
         self._both[0, 0] = 0.0
         self._both[0, 0] = -legendre.legval(0.0, self._both[:, 0])
 
+    def values(self, eta: Array) -> Array:
+        """P_k at eta, as those of a call."""
+        return legendre.legval(2 * eta, self._both[:, 0])
+
     def __call__(self, eta: Array, k: int | slice = slice(None)) -> tuple[Array, Array]:
         """P_k and its derivative at eta in [-1/2, 1/2], shape (n,) + eta.shape."""
         value, slope = legendre.legval(2 * eta, self._both[:, :, k])
@@ -334,12 +338,18 @@ class ElementBeam(Immutable, Element):
 
     def values(self, mapping: MappingBeam, X: Array, tind: Array | None = None) -> Array:
         """The local functions of :meth:`of_mesh` alone."""
-        if self.section.number or not self.by_reference:
+        if not self.by_reference:
             return self.of_mesh(mapping, X, tind)[0]
-        found = hermite_basis(self._along[0], X[0])
+        (xi, eta), (m, n), (power, slope) = X, self._along, self._powers[:, :, None, None]
         lengths = mapping.mesh.lengths if tind is None else mapping.mesh.lengths[tind]
-        return (lengths ** self._powers[1][:, None])[:, :, None] * (
-            found[:, None] if found.ndim == 2 else found)
+        found = hermite_basis(m, xi)
+        if self.section.number:
+            axis, section, node, number = self._places
+            A, P = found, self.section.values(eta - 0.5).take(number, axis=0)
+            found = np.empty((self._powers.shape[1], *P.shape[1:]), P.dtype)
+            found[axis], found[section] = A, hermite_basis(n, xi).take(node, axis=0) * P
+        found = lengths[:, None] ** slope * (found[:, None] if found.ndim == 2 else found)
+        return found * mapping.height(xi, tind)[0] ** power if self.section.number else found
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:

@@ -3,6 +3,7 @@ d/dX, then d/dY, at the points of the samples."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -132,19 +133,14 @@ def beam_gradients(mesh: MeshBeam, element: ElementBeam, X: Array,
     return G, frame.transpose(1, 2, 3, 0)
 
 
-class Samples(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Samples:
     """Sampling points of the strains of a term."""
 
     X: Array  # points, (2, n)
     where: list[Array]  # numbers of the points of the axial rows, and of the others
     rows: Array  # as in StrainTables
     component: Array  # 0, 1 or 2 of each sample
-
-    def __hash__(self):
-        return id(self.X)
-
-    def __eq__(self, other):
-        return self.X is other.X
 
 
 @lru_cache(64)
