@@ -39,18 +39,8 @@ class Bound:
 
 
 class BoundConstraint(Bound):
-    """Equations Phi(u, t) = 0, see :class:`~skfem_ancf.actions.joints.Joint` for its methods.
-
-    Attributes
-    ----------
-    equations, constant, moving, driver, tabled
-        As of a Joint.
-
-    Other Parameters
-    ----------------
-    u, v, t, multipliers, u0, u1, v0, v1, times, N
-        As of a Joint.
-    """
+    """Equations Phi(u, t) = 0: see :class:`~skfem_ancf.actions.joints.Joint` for attributes,
+    methods and their arguments."""
 
     equations: tuple[str, ...] = ()
     constant = True
@@ -80,13 +70,8 @@ class BoundConstraint(Bound):
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
-        """Hessian, the sum over k of multipliers[k] d^2 Phi_k / du^2.
-
-        Returns
-        -------
-        rows, columns, values
-            Shapes (k,); or None if the Jacobian is constant.
-        """
+        """Hessian, the sum over k of multipliers[k] d^2 Phi_k / du^2: rows, columns and values
+        (k,); None if the Jacobian is constant."""
         return None
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
@@ -133,13 +118,7 @@ class BoundConstraint(Bound):
         return self.offset(times, N)
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        """Jacobian in the reference configuration at several times.
-
-        Returns
-        -------
-        rows, columns, values
-            Shapes (k,), (k,) and (n, k).
-        """
+        """Rows, columns (k,) and values (n, k) of the reference Jacobian at several times."""
         zero, m = np.zeros(N), len(self.equations)
         if self.turning:
             J = np.array([self.jacobian(zero, t) for t in times])
@@ -148,13 +127,8 @@ class BoundConstraint(Bound):
         return rows, columns, values[None].repeat(len(times), axis=0)
 
     def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
-        """Second derivatives of Phi in the reference configuration.
-
-        Returns
-        -------
-        equations, rows, columns, values
-            Shapes (k,).
-        """
+        """Equations, rows, columns and values (k,) of d^2 Phi / du^2 in the reference
+        configuration."""
         none = np.zeros(0, dtype=int)
         zero, out = np.zeros(N), [(none, none, none, np.zeros(0))]
         for row, unit in enumerate(np.eye(len(self.equations))):
@@ -168,18 +142,8 @@ class BoundConstraint(Bound):
 
 
 class BoundForce(Bound):
-    """A force on ``links``, see :class:`~skfem_ancf.actions.forces.ForceElement` for its methods.
-
-    Attributes
-    ----------
-    distributed, along, links, groups, entries, changing, symmetric
-        As of a ForceElement.
-
-    Other Parameters
-    ----------------
-    x, y, v, t, history, dt, past
-        As of a ForceElement.
-    """
+    """A force on ``links``: see :class:`~skfem_ancf.actions.forces.ForceElement` for attributes,
+    methods and their arguments."""
 
     symmetric = True
     distributed = False

@@ -118,11 +118,8 @@ class Item(Immutable, Bound):
         return out
 
     def symbols(self, layout: Layout) -> Iterable[Any]:
-        """What a picture shows of it, with its beam by number; nothing by default.
-
-        Returns
-        -------
-        list of :class:`skfem_ancf.actions.symbols.Symbol`
+        """What a picture shows of it: a list of :class:`skfem_ancf.actions.symbols.Symbol`, with
+        its beam by number; nothing by default.
 
         Examples
         --------

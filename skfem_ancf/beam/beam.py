@@ -299,13 +299,8 @@ class Beam(Immutable):
     # fields
 
     def gradients(self, u: Array, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
-        """Displacement gradient in the beam frame, and this frame.
-
-        Returns
-        -------
-        H, frame
-            Shape (2, 2, nelements, npoints) both: H[i, J] = d u_i / d X_J, J along the frame.
-        """
+        """Displacement gradient H[i, J] = d u_i / d X_J in the beam frame, and this frame, shape
+        (2, 2, nelements, npoints) both."""
         return kinematics.gradients(self, *self._checked(u, X, tind))
 
     def displacements(self, u: Array, X: Array, tind: Array | None = None) -> Array:

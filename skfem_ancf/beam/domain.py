@@ -405,15 +405,8 @@ class Domain(Immutable):
         return self.basis.boundary(self._facets(boundary))
 
     def moments(self, boundary: Any) -> tuple[Array, Array, Array, Array]:
-        """Mean and best straight line of a boundary, as weights of the DOFs of a component.
-
-        Returns
-        -------
-        x, d
-            Position (2,) of the mean, and the line from one end to the other, (2,).
-        mean, line
-            Weights (N / 2,) of the DOFs of one component.
-        """
+        """Mean position x (2,) of a boundary and the line d (2,) from end to end of the best
+        straight one, and both as weights (N / 2,) of the DOFs of one component."""
         basis = self.trace(boundary)
         x, dx = np.asarray(basis.global_coordinates()), basis.dx
         length, centre = np.sum(dx), np.sum(x * dx, axis=(1, 2)) / np.sum(dx)

@@ -269,20 +269,15 @@ class ElementBeam(Immutable, Element):
 
     def local(self, X: Array, h: float | Array, i: slice = slice(None),
               rate: float | Array = 0.0) -> tuple[Array, Array, Array, Array]:
-        """Local functions on the reference cell, their derivatives, and their powers of the length.
+        """Local functions on the reference cell, their derivatives by xi and eta, (n,) +
+        X.shape[1:], or + the shape of h if that has more axes, and the power of the length that
+        multiplies a function: the number of its derivatives along X.
 
         Parameters
         ----------
         h, rate
             Height and its derivative by xi: numbers, values at the points, X.shape[1:], or values
             of each element at the same points, (nelements, npoints).
-
-        Returns
-        -------
-        value, d_xi, d_eta
-            Arrays (n,) + X.shape[1:], or + the shape of h if that has more axes.
-        slope
-            The power of L that multiplies a function: the number of its derivatives along X.
         """
         power, slope = self._powers[:, i]
         unit, axes = self._unit(X, i), 0 if type(h) is float else np.ndim(h)
@@ -353,13 +348,8 @@ class ElementBeam(Immutable, Element):
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
-        """The local function ``i`` and its gradient, for scikit-fem's ``Basis``.
-
-        Returns
-        -------
-        tuple of DiscreteField
-            One field: value (nelements, npoints) and grad (2, nelements, npoints).
-        """
+        """The local function ``i`` and its gradient, for scikit-fem's ``Basis``: one DiscreteField
+        with value (nelements, npoints) and grad (2, nelements, npoints)."""
         if not 0 <= i < 2 * self.nodal_dofs:
             self._index_error()
         value, grad = self.functions(mapping, X, tind, slice(i, i + 1))

@@ -82,7 +82,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              lagrange: bool = False, undeformed: bool = False, recover: bool = True,
              fields: Any = None, precision: str = "double") -> Path:
-    """Write the deformed body of a state for ParaView.
+    """Write the deformed body of a state for ParaView; returns the path.
 
     All beams go into one file, which replaces an older one once it is complete. Neighbouring
     elements share points where all fields of the file agree to round-off, as recovered fields do;
@@ -130,11 +130,6 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         materials that yield.
     precision
         "double", or "single" for files of half the size.
-
-    Returns
-    -------
-    pathlib.Path
-        The file.
 
     Examples
     --------

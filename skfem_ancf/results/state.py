@@ -108,7 +108,8 @@ class Derivatives:
     def gradient(self, J: Any, wrt: Sequence[Any]) -> list[Array]:
         """Derivatives of a reading of this static solution by parameters of its scene.
 
-        One linear system for all parameters; fields of parameters cost about as much as numbers.
+        A list with an array of the shape of each parameter; with the first axis of J if J is an
+        array. One linear system for all parameters; fields cost about as much as numbers.
 
         Parameters
         ----------
@@ -122,11 +123,6 @@ class Derivatives:
             an argument of it that is a number or an array. Beams have the arguments of their
             material and mesh, too. ``(beam, "height", "nodes")`` and ``(beam, "height",
             "elements")`` are fields; "E" and "width" may be fields as well.
-
-        Returns
-        -------
-        list of ndarray
-            For each parameter an array of its shape; with the first axis of J if J is an array.
 
         Examples
         --------
@@ -145,17 +141,13 @@ class Derivatives:
         return self._derivatives(wrt, [J]).of_readings()
 
     def sensitivity(self, wrt: Sequence[Any]) -> list[Array]:
-        """Derivatives of all displacements of this static solution by few parameters.
+        """Derivatives of all displacements of this static solution by few parameters: a list of
+        arrays (N, ...) with the axes of each parameter.
 
         Parameters
         ----------
         wrt
             As for :meth:`gradient`.
-
-        Returns
-        -------
-        list of ndarray
-            For each parameter an array (N, ...) with the axes of the parameter.
         """
         return self._derivatives(wrt).of_displacements()
 

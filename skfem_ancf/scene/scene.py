@@ -167,17 +167,14 @@ class Scene(Model):
     def matrices(self, state: State | None = None) -> SceneMatrices:
         """Mass, damping, tangent stiffness, force and constraints in a state, as SciPy's sparse.
 
+        A named tuple ``M, D, K, force, J`` for all degrees of freedom; the unknowns are
+        :attr:`free`.
+
         Parameters
         ----------
         state
             A State of this scene, as from :meth:`state`; None for the reference configuration
             without loads.
-
-        Returns
-        -------
-        SceneMatrices
-            A named tuple ``M, D, K, force, J`` for all degrees of freedom; the unknowns are
-            :attr:`free`.
 
         Examples
         --------
@@ -206,6 +203,11 @@ class Scene(Model):
                 beams: Sequence[Beam] | None = None, **changes: Any) -> Self:
         """The scene with other loads, on other beams, or with changed arguments of one beam.
 
+        On an unchanged mesh a state of the old scene is a good ``solve_static(start=state)``.
+        Raises NameUnknown if an argument or the beam is not known, InputError if the mesh differs
+        and a boundary was given by facet numbers, or velocities by DOFs, MeshError if a place or a
+        point is not found on the other mesh.
+
         Parameters
         ----------
         loads
@@ -216,20 +218,6 @@ class Scene(Model):
             or a function are found again on them.
         **changes
             Arguments of :class:`Beam`, as ``material=...``, ``width=...`` or ``mesh=...``.
-
-        Returns
-        -------
-        Scene
-            On an unchanged mesh a state of the old scene is a good ``solve_static(start=state)``.
-
-        Raises
-        ------
-        NameUnknown
-            If an argument or the beam is not known.
-        InputError
-            If the mesh differs and a boundary was given by facet numbers, or velocities by DOFs.
-        MeshError
-            If a place or a point is not found on the other mesh.
 
         Examples
         --------
@@ -890,7 +878,8 @@ class Scene(Model):
         return follow(*resume(self.system, path, scheme, self._located()), progress)
 
     def modes(self, k: int, state: State | None = None) -> Modes:
-        """The k lowest natural frequencies and their shapes.
+        """The k lowest natural frequencies and their shapes. A ModelWarning says if the mesh is
+        coarse for a frequency: an estimated error above 3 %.
 
         Parameters
         ----------
@@ -899,11 +888,6 @@ class Scene(Model):
         state
             The state to linearise about, prestress included; the reference configuration by
             default.
-
-        Returns
-        -------
-        Modes
-            A ModelWarning says if the mesh is coarse for a frequency: an estimated error above 3 %.
 
         Examples
         --------

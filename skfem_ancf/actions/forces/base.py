@@ -123,14 +123,8 @@ class ForceElement(BoundForce, Item):
     """
 
     def bind(self, layout: Layout) -> Sequence[Vector]:
-        """The points and sections on which it acts, called on a copy.
-
-        Returns
-        -------
-        list
-            Results of :func:`skfem_ancf.actions.forces.point` and
-            :func:`skfem_ancf.actions.forces.section`.
-        """
+        """Points and sections on which it acts, called on a copy: a list of results of
+        :func:`skfem_ancf.actions.forces.point` and :func:`skfem_ancf.actions.forces.section`."""
         raise NotImplementedError
 
     def bound_on(self, layout: Layout) -> list[Any]:
