@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import sparse
 
-from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.core.errors import ModelWarning
 
 E, RHO, H = 2e11, 7800.0, 0.02
@@ -67,6 +68,19 @@ def test_a_welded_chain_bends_like_one_beam():
     assert str(state.verdict) == "stable"
     ratio = scene.modes(1).frequencies[0] / (3.516015 * np.sqrt(EI / (RHO * H**2)))
     assert ratio == pytest.approx(1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(3)])
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_members_of_one_length_have_directions_of_their_own(element, angle):
+    """Two bars that lean on each other: F = 2 EA sin(a)^2 v / L, turned with the picture."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    points = np.array([[0.0, 0.0], [4.0, 3.0], [8.0, 0.0]]) @ turn.T
+    frame = Frame.from_lines(points, [[0, 1], [1, 2]], material=StVenantKirchhoff(E, 0.0, RHO),
+                             height=H, width=H, element=element)
+    frame.pin([0, 2]).point_force(turn @ (0.0, -10.0), at=1)
+    moved = turn.T @ frame.solve_linear().displacement(tuple(points[1]))
+    assert_allclose(moved, [0.0, -10.0 * 5.0 / (2 * E * H**2 * 0.36)], rtol=1e-3, atol=1e-13)
 
 
 def test_a_large_frame_stands_without_dense_matrices():

@@ -248,6 +248,7 @@ class MeshBeam(NumberedMesh):
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
         made, (height, heights, taper) = object.__new__(cls), heights
+        one_line = tangent.shape[1] == 1
         zero, size = np.zeros(p.shape), require_moderate("the nodes", p)
         tangent = tangent + zero
         # without __post_init__, which checks the shapes and numbers of given arrays
@@ -259,8 +260,10 @@ class MeshBeam(NumberedMesh):
         least, most, noise = lengths.min(), lengths.max(), 8 * EPS * size
         if curve is None:
             # the round-off of the nodes' positions is no difference in length
-            vars(made).update(is_straight=True, is_uniform=heights is None and bool(
-                most - least <= 1e-13 * most + noise))
+            vars(made)["is_straight"] = True
+            if one_line:  # lines of a graph have directions and lengths of their own
+                vars(made)["is_uniform"] = heights is None and bool(
+                    most - least <= 1e-13 * most + noise)
             for array in (p, t, tangent, lengths, made.p_Y, zero, s):  # they need no copies
                 array.flags.writeable = False
         if curve is not None or heights is not None or least <= 2.0 * noise or not least * height:
