@@ -31,7 +31,22 @@ FORMULATIONS = ("assumed", "continuum", "ecm", "strain-split")
 HEADER = '''import numpy as np
 from skfem_ancf import *
 from skfem_ancf.elements import ELEMENTS
+from skfem_ancf.actions.forces import point
+class Slider(ForceElement):
+    def __init__(self, k, most, beam):
+        self.k, self.most, self.beam = k, most, beam
+    def bind(self, layout):
+        self.at = point(layout, self.beam, "right")
+        return [self.at]
+    def start(self):
+        return self.at.start
+    def evaluate(self, x, v, t, history, dt):
+        d = x[0] - history
+        F = self.k * d * np.minimum(1.0, self.most / np.maximum(self.k * np.sqrt(d @ d), 1e-300))
+        return -F[None], x[0] - F / self.k
 '''
+LOADS = tuple(f"scene.{name}(" for name in (
+    "point_force", "gravity", "traction", "moment", "pressure", "line_load"))
 
 
 # drawing
@@ -93,18 +108,26 @@ def _beam(dice, k, most, origin, E):
     E, nu = E * dice.choice((1, 1, 10)), dice.choice((0.0, 0.3, 0.3, 0.45, -0.2))
     plane = dice.choice(("stress", "stress", "strain"))
     lines = [f"mesh{k} = {mesh}",
-             f"material{k} = " + _with_history(dice, law, formulation, (
-                 f"{law}(E={E}, nu={nu}, density=1.0, plane={plane!r})")),
+             f"material{k} = " + _with_history(dice, law, formulation, E, h / L, (
+                 f"E={E}, nu={nu}, density=1.0, plane={plane!r}")),
              f"beam{k} = Beam(mesh{k}, {element}, material{k}, 0.1, {formulation!r}, "
              f"name='b{k}', compiled=COMPILED)"]
     return lines, L, E * 0.1 * h**3 / 12.0
 
 
-def _with_history(dice, law, formulation, text):
-    """The text of a law, perhaps as one with a history that answers at once as that law does."""
-    if law != "StVenantKirchhoff" or formulation == "continuum" or dice.integer(0, 7):
-        return text
-    return f"Prony({text}, [0.3], [1.0])"
+def _with_history(dice, law, formulation, E, slope, numbers):
+    """The text of a law, perhaps of one with a history: one that answers at once as it does, or
+    one that yields; ``slope`` is the size of strains in bending."""
+    elastic, kind = f"{law}({numbers})", dice.integer(0, 7)
+    if law != "StVenantKirchhoff" or formulation != "assumed" or kind > 2:
+        return elastic
+    if kind == 0:
+        return f"Prony({elastic}, [0.3], [1e9])"  # at once, on paths too
+    y = float(f"{E * min(0.03, slope * 10.0 ** dice.number(-2, 0.3)):.3g}")
+    hardening = dice.choice((0.0, 1e-3 * E, 0.1 * E, f"Voce({y}, 20.0, {1e-3 * E})",
+                             f"[(0, {y}), (0.002, {1.2 * y}), (0.01, {1.3 * y})]"))
+    return (f"ElasticPlastic({numbers}, yield_stress={y}, hardening={hardening}, "
+            f"kinematic={dice.choice((0.0, 1e-3, 0.1)) * E})")
 
 
 def _supports(dice, n):
@@ -182,6 +205,31 @@ def draw_leaves(dice):
     return "\n".join([*lines, "options = {}", ""])
 
 
+def draw_pressed(dice):
+    """The script of a beam that is pressed on an obstacle and dragged along it, and back."""
+    E, L, h = dice.choice((1e3, 1e6, 2e11)), dice.number(0.5, 2.0), dice.choice((0.02, 0.05))
+    gap, R = h * dice.choice((0.0, 0.001, 0.1)), dice.number(0.05, 0.5)
+    element = dice.choice(("ElementBeamCable(3)", "ElementBeamCable(5)", "ElementBeamANCF(2)",
+                           "ElementBeamANCFCubic(1)"))
+    material = dice.choice((f"StVenantKirchhoff({E}, 0.3)", f"NeoHookean({E}, 0.3)",
+                            f"ElasticPlastic({E}, 0.3, {0.2 * h / L * E}, {0.1 * E})"))
+    if "Cable" in element or "Plastic" in material:
+        material = material.replace("NeoHookean", "StVenantKirchhoff")
+        element = element.replace("Cubic(1)", "Cubic(2)")
+    shape = dice.choice((f"Line((0.0, {-0.5 * h - gap}), (0.0, 1.0))",
+                         f"Circle(({dice.number(0.6, 0.95) * L}, {-0.5 * h - gap - R}), {R})"))
+    P = float(f"{dice.number(0.05, 1.0) * E * 0.1 * h**3 / 4 / L**2:.3g}")
+    lines = [f"path = lambda t: np.interp(t, [0, 1, 2], [0, 1, {dice.number(-1, 1)}])",
+             f"mesh0 = MeshBeam.init_line(np.linspace(0, {L}, {dice.integer(4, 10)}), {h})",
+             f"beam0 = Beam(mesh0, {element}, {material}, 0.1, name='b0', compiled=COMPILED)",
+             "scene = Scene(beam0).clamp('left', thickness='free')",
+             f"scene.obstacle({shape}, friction={dice.choice((0.0, 0.1, 0.5, 1.0))})",
+             dice.choice((f"scene.point_force((0.0, {-P}), at='right')",
+                          f"scene.line_load((0.0, {-2 * P / L}))")),
+             f"scene.point_force(({dice.number(-20, 20) * P}, 0.0), at='right', amplitude=path)"]
+    return "\n".join([*lines, f"options = {{'increments': {dice.integer(1, 5)}}}", ""])
+
+
 def draw(dice):
     """The script of a scene: it makes ``scene`` and ``options``; COMPILED is given to it."""
     n = dice.choice((1,) * 6 + (2,) * 3 + (3,))
@@ -203,8 +251,16 @@ def draw(dice):
     options = {"method": "newton"} if dice.integer(0, 7) == 0 else {}
     if dice.integer(0, 7) == 0:
         options["first_step"] = 0.25
-    if dice.integer(0, 9) == 9:  # drawn last: the others stay as they are
-        return draw_leaves(dice)
+    if (kind := dice.integer(0, 9)) > 7:
+        return draw_leaves(dice) if kind == 9 else draw_pressed(dice)
+    if dice.integer(0, 9) == 0:
+        lines.append(f"scene.add(Slider({min(EI)}, {dice.number(0.01, 0.5) * min(EI)}, "
+                     f"'b{n - 1}'))")
+    if any("Plastic" in line or "Slider" in line for line in lines):  # on a path, and back
+        options = {"increments": dice.integer(1, 5)}
+        lines.insert(0, f"path = lambda t: np.interp(t, [0, 1, 2], [0, 1, {dice.number(-1, 1)}])")
+        lines = [line[:-1] + ", amplitude=path)" if line.startswith(LOADS) else line
+                 for line in lines]
     return "\n".join(lines + [f"options = {options}", ""])
 
 
@@ -218,7 +274,9 @@ class Body:
     scikit-fem's fields. The stabilisation, whose matrix is constant, is the formulation's own.
     """
 
-    def __init__(self, beam):
+    def __init__(self, beam, past=None):
+        #: history variables (k, elements, points) of a material that yields
+        self.past = past
         self.beam, self.nb = beam, beam.nd // 2
         t = beam.mesh.t
         self.dofs = np.concatenate([t[0][:, None] * self.nb + np.arange(self.nb),
@@ -247,7 +305,7 @@ class Body:
         for name in ("xx", "yy", "xy"):
             xi = term.nodes(name)
             X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
-            tables.append((self._gradients(X, np.ones(X.shape[1])), term.matrix(name)))
+            tables.append((self._gradients(X, np.ones(X.shape[1])), _between(term, name)))
         X, W = term.quadrature
         dV = self.beam.width * W * self.beam.mesh.mapping().detDF(X)
         return term.law, tables, dV
@@ -296,18 +354,26 @@ class Body:
             rows[..., dofs, :] += f[..., e, :, :]
         return out
 
+    def _strains(self, tables, q):
+        """Strains (3, ...) and derivatives of the position that they are made of."""
+        strain, F = [], []
+        for name, (T, matrix) in zip(("xx", "yy", "xy"), tables):
+            rx, ry = (np.einsum("epk,...eki->...epi", T[J], q, optimize=True) for J in (0, 1))
+            a, b = {"xx": (rx, rx), "yy": (ry, ry), "xy": (rx, ry)}[name]
+            value = np.sum(a * b, axis=-1)
+            value = value if name == "xy" else 0.5 * (value - 1.0)
+            strain.append(value if matrix is None else value @ matrix.T)
+            F.append((rx, ry))
+        return np.array(strain), F
+
     def _body_force(self, q):
         total = 0.0
         for law, tables, dV in self.terms:
-            strain, F = [], []
-            for name, (T, matrix) in zip(("xx", "yy", "xy"), tables):
-                rx, ry = (np.einsum("epk,...eki->...epi", T[J], q, optimize=True) for J in (0, 1))
-                a, b = {"xx": (rx, rx), "yy": (ry, ry), "xy": (rx, ry)}[name]
-                value = np.sum(a * b, axis=-1)
-                value = value if name == "xy" else 0.5 * (value - 1.0)
-                strain.append(value if matrix is None else value @ matrix.T)
-                F.append((rx, ry))
-            S = law.stress(np.array(strain)) * dV
+            strain, F = self._strains(tables, q)
+            if self.past is not None:
+                flow = self.past[:3] / law.scale.reshape(3, 1, 1)
+                strain = strain - flow.reshape(3, *(1,) * (strain.ndim - 3), *flow.shape[1:])
+            S = law.stress(strain) * dV
             for name, (T, matrix), (rx, ry), s in zip(("xx", "yy", "xy"), tables, F, S):
                 s = (s if matrix is None else s @ matrix)[..., None]
                 if name == "xy":
@@ -317,6 +383,22 @@ class Body:
                     J, r = (0, rx) if name == "xx" else (1, ry)
                     total = total + np.einsum("epk,...epi->...eki", T[J], s * r, optimize=True)
         return total
+
+    def _fibres(self, n):
+        """Distances from the axis, and shares of the area."""
+        x, w = np.polynomial.legendre.leggauss(n)
+        return 0.5 * self.beam.mesh.height * x, 0.5 * w
+
+    def strain(self, u):
+        """Of a material that yields, at its points: (3, ...), of a cable along the fibres."""
+        q = self._elements(self.q0 + u)
+        if self.beam.has_sections:
+            (law, tables, _), = self.terms
+            return law.scale.reshape(3, 1, 1) * self._strains(tables, q)[0]
+        (_, _, s, kappa), (_, _, s0, kappa0) = map(self._curvature, (q, self._elements(self.q0)))
+        y, _ = self._fibres(self.past[0].size // s.size)
+        return ((np.sqrt(s) - np.sqrt(s0))[..., None] - (kappa - kappa0)[..., None] * y).reshape(
+            len(s), -1)
 
     def _curvature(self, q):
         a, b = (np.einsum("epk,...eki->...epi", G, q) for G in self.G)
@@ -328,6 +410,14 @@ class Body:
         _, _, s0, kappa0 = self._curvature(self._elements(self.q0))
         N = self.EA * (np.sqrt(s) - np.sqrt(s0)) * self.w
         M = self.EI * (kappa - kappa0) * self.w
+        if self.past is not None:
+            m, flow = self.beam.material, self.past[0]
+            if m.plane == "strain":  # plastic strain across the plane adds to the elastic one
+                flow = flow - m.nu * (self.past[0] + self.past[1])
+            flow = flow.reshape(*s0.shape, -1)
+            y, w = self._fibres(flow.shape[-1])
+            N = N - self.EA * (flow @ w) * self.w
+            M = M + self.EA * (flow @ (w * y)) * self.w
         turned_a, turned_b = (np.stack([-x[..., 1], x[..., 0]], -1) for x in (a, b))
         along = (N / np.sqrt(s))[..., None] * a + (M / s)[..., None] * (
             -turned_b - 2.0 * kappa[..., None] * a)
@@ -335,17 +425,44 @@ class Body:
                 + np.einsum("epk,...epi->...eki", self.G[1], (M / s)[..., None] * turned_a))
 
 
+def _between(term, name):
+    """Matrix from samples of a strain to the points of a term; None for the identity."""
+    x, (eta, _) = term.axis[0], term.section
+    if name not in term.samples and term.section_samples is None:
+        return None
+    V = np.polynomial.legendre.legvander
+    at, n = 2.0 * np.asarray(term.nodes(name)) - 1.0, len(term.nodes(name)) - 1
+    along = V(2.0 * np.asarray(x) - 1.0, n) @ np.linalg.inv(V(at, n))
+    return np.kron(along, term.section_samples[1] if term.section_samples else np.eye(len(eta)))
+
+
 def internal_force(bodies, system, u):
     """Of a scene, (..., N)."""
     return np.concatenate([b.force(u[..., s]) for b, s in zip(bodies, system.slices)], axis=-1)
 
 
-def external_force(system, u):
+def external_force(system, u, t=None):
     out = np.zeros(system.N, dtype=u.dtype)
     for load in system.loads:
         s = system.of(load)
-        out[s] += load.force(u[s])
+        out[s] += load.factor(t) * load.force(u[s])
     return out
+
+
+def past_of(state, number):
+    """History variables of a beam that yields, (k, elements, points); None for other beams."""
+    beam = state.system.beams[number]
+    past = state._equations.histories.past(beam)
+    if past is None or not hasattr(beam.material, "yield_stress"):
+        return None
+    n = beam.material.number + (3 if beam.has_sections else 1)
+    return past.history.reshape(n, -1, beam.mesh.nelements)[:-3 if beam.has_sections else -1
+                                                            ].transpose(0, 2, 1)
+
+
+def time_of(state):
+    """The time, or in statics the load factor."""
+    return state.load if state.t is None else state.t
 
 
 def tangent(bodies, state):
@@ -353,12 +470,13 @@ def tangent(bodies, state):
     system, N, step = state.system, state.system.N, 1e-30
     K = np.imag(internal_force(bodies, system, state.u + 1j * step * np.eye(N))).T / step
     for j in range(N) if not all(load.constant for load in system.loads) else ():
-        K[:, j] -= np.imag(external_force(system, state.u + 1j * step * np.eye(N)[j])) / step
+        K[:, j] -= np.imag(external_force(system, state.u + 1j * step * np.eye(N)[j],
+                                          state.t)) / step
     if system.constraints.joints:
         h = 1e-3 * system.size
         for j in range(N):
             a, b = (state.multipliers @ system.constraints.full_jacobian(
-                state.u + x * np.eye(N)[j], state.load) for x in (-h, h))
+                state.u + x * np.eye(N)[j], time_of(state)) for x in (-h, h))
             K[:, j] += (b - a) / (2 * h)  # exact: the joints are quadratic at most
     return K
 
@@ -370,12 +488,15 @@ class Wrong(Exception):
     """An equilibrium that is none, or that is not what it says."""
 
 
-def check(scene, state, tol=1e-5):
-    """The verdict of the dense eigenvalues; raises Wrong."""
+def check(scene, state, before=None, tol=1e-5):
+    """The verdict of the dense eigenvalues; raises Wrong. ``before`` is the last state."""
     system, u = state.system, state.u
     if not np.all(np.isfinite(u)) or not state.converged:
         raise Wrong("it says that it has converged, and it has not")
-    bodies = [Body(b) for b in system.beams]
+    bodies = [Body(b, past_of(state, k)) for k, b in enumerate(system.beams)]
+    for k, (body, s) in enumerate(zip(bodies, system.slices)):
+        if body.past is not None:
+            check_flow(body, u[s], None if before is None else past_of(before, k))
     force = internal_force(bodies, system, u)
     for body, s in zip(bodies, system.slices):  # the textbook, as scikit-fem assembles it
         beam = body.beam
@@ -386,12 +507,24 @@ def check(scene, state, tol=1e-5):
             if np.max(np.abs(f - force[s])) > 1e-8 * np.max(np.abs(f)) + 1e-10 * beam.material.E \
                     * beam.width * beam.mesh.height:
                 raise Wrong("the textbook's form gives another force")
-    external = external_force(system, u) * state.load
-    touching = bool(state._equations.forces.changing)
-    if touching:
+    external, now = external_force(system, u, state.t) * state.load, time_of(state)
+    forces = state._equations.forces
+    touching = bool(forces.changing or forces.contacts.obstacles)
+    if forces.changing:
         check_contact(system, state, force)
+    if forces.contacts.obstacles:
+        check_pressed(system, state, before, force)
+    if touching:
         force = state.internal_force
-    R = external - force - state.multipliers @ system.constraints.full_jacobian(u, state.load)
+    for item in forces.remembering if not touching else ():
+        (link,), one = item.links, item.element
+        x = link(u)[None]
+        F = one.evaluate(x, 0.0 * x, now, item.history, 0.0)[0][0]
+        if np.hypot(*F) > one.most * (1.0 + 1e-9):
+            raise Wrong("a slider holds more than it can")
+        force = force - np.bincount(link.dofs.ravel(), (link.weights * F[:, None] + 0.0 * link.dofs
+                                                        ).ravel(), system.N)
+    R = external - force - state.multipliers @ system.constraints.full_jacobian(u, now)
     K = tangent(bodies, state)
     scale = 1.0 / np.maximum(np.abs(np.diag(K)), 1e-300)
     free = system.constraints.free
@@ -399,13 +532,62 @@ def check(scene, state, tol=1e-5):
     size = np.sqrt(max(np.sum(force**2 * scale), np.sum(external**2 * scale)))
     if rho > tol * size + 100.0 * system.scales.force_noise:
         raise Wrong(f"the residual is {rho / size:.3g} of the forces")
-    gap = np.max(np.abs(system.constraints.constraint(u, state.load)), initial=0.0)
+    gap = np.max(np.abs(system.constraints.constraint(u, now)), initial=0.0)
     if gap > 1e-9 * system.size:
         raise Wrong(f"a joint is open by {gap:.3g}")
-    held = u[system.constraints.fixed] - system.constraints.values(state.load)
+    held = u[system.constraints.fixed] - system.constraints.values(now)
     if np.max(np.abs(held), initial=0.0) > 1e-12 * system.size:
         raise Wrong("a support is not where it should be")
-    return "in contact" if touching else _stability(system, state, K, scale)
+    return ("in contact" if touching else "with a slider" if forces.remembering else
+            _stability(system, state, K, scale))
+
+
+def check_flow(body, u, before):
+    """Stress on or within the yield surface, flow along its normal, hardening as it says."""
+    m, past, strain = body.beam.material, body.past, body.strain(u)
+    flow, back, p = past[:3], past[3:6], past[6]
+    h, y = m.hardening, m.yield_stress
+    y = (np.interp(p, *h.T) if isinstance(h, np.ndarray) else y + h * p if np.ndim(h) == 0 else
+         y + h[0] * (1.0 - np.exp(-h[1] * p)) + h[2] * p)
+    change = past - (0.0 * past if before is None else before)
+    if not body.beam.has_sections:
+        E = m.E / (1.0 if m.plane == "stress" else 1.0 - m.nu**2)
+        x, normal, K = E * (strain - flow[0]) - back[0], None, m.kinematic
+        size, normal = np.abs(x), np.sign(x)[None]
+        flow, back, change_of = flow[:1], back[:1] - K * flow[:1], change[:1]
+        if m.plane == "strain":
+            return
+    else:
+        z = flow[0] + flow[1]  # minus the plastic strain across the plane
+        e = strain - flow
+        C = m.E / ((1.0 + m.nu) * (1.0 - 2.0 * m.nu)) * np.array(
+            [[1 - m.nu, m.nu, m.nu], [m.nu, 1 - m.nu, m.nu], [m.nu, m.nu, 1 - m.nu]])
+        G = m.E / (2.0 + 2.0 * m.nu)
+        if m.plane == "stress":
+            S = np.array([(e[0] + m.nu * e[1]), (e[1] + m.nu * e[0]), 0.0 * z]) * m.E / (
+                1.0 - m.nu**2)
+            b = np.array([back[0], back[1], 0.0 * z])
+            found = np.array([2.0 * back[0] - back[1], 2.0 * back[1] - back[0], 6.0 * back[2]]) / 3
+        else:
+            S = np.einsum("ij,j...->i...", C, np.array([e[0], e[1], z]))
+            b = np.array([back[0], back[1], -back[0] - back[1]])
+            found = np.array([back[0], back[1], 2.0 * back[2]])
+        x, shear = S - b, G * e[2] - back[2]
+        x = x - x.mean(axis=0)
+        size = np.sqrt(1.5 * np.sum(x * x, axis=0) + 3.0 * shear**2)
+        normal = 1.5 * np.array([x[0], x[1], 2.0 * shear]) / np.where(size > 0.0, size, 1.0)
+        back, change_of = found - 2.0 / 3.0 * m.kinematic * flow, change[:3]
+    tiny = 1e-8 * (m.yield_stress + m.E * np.abs(strain).max())
+    if np.any(size > y + tiny):
+        raise Wrong(f"the stress is {np.max(size / y):.6g} times the yield stress")
+    if np.any(np.abs(back) > tiny):
+        raise Wrong("the back stress is not that of the plastic strain")
+    flows = change[6] > 1e-9 * (m.yield_stress / m.E)
+    if np.any(change[6] < -1e-14) or np.any(np.abs(size - y)[flows] > tiny):
+        raise Wrong("a point flows and is not on the yield surface")
+    if before is not None and np.any(np.abs(change_of - change[6] * normal) > 1e-7 * (
+            np.abs(strain).max())):
+        raise Wrong("plastic strain does not grow along the normal of the yield surface")
 
 
 def check_contact(system, state, internal):
@@ -439,6 +621,34 @@ def check_contact(system, state, internal):
             raise Wrong("points stick without friction")
 
 
+def check_pressed(system, state, before, internal):
+    """Contact with an obstacle: gaps, the cone of friction, and sliding against its force."""
+    one, on = state._equations.forces.contacts.obstacles[0], state.contact()
+    if not len(on):
+        return
+    force = (state.internal_force - internal).reshape(-1, system.beams[0].nd // 2, 2)[:, 0]
+    size = np.abs(on.force).max()
+    if np.max(np.abs(force.sum(axis=0) + on.total)) > 1e-6 * size + 1e-9 * np.abs(internal).max():
+        raise Wrong("the nodal forces of contact are not those of its points")
+    if hasattr(one.shape, "center"):
+        normal = on.points - one.shape.center[:, None]
+        gap = np.hypot(*normal) - one.shape.radius
+        normal = normal / np.hypot(*normal)
+    else:
+        normal = np.array([[0.0], [1.0]]) + 0.0 * on.points
+        gap = on.points[1] - one.shape.point[1]
+    if np.max(np.abs(gap - on.gap)) > 1e-9 * system.size:
+        raise Wrong("a gap is not the distance from the obstacle")
+    N = np.sum(on.force * normal, axis=0)
+    T = on.force[1] * normal[0] - on.force[0] * normal[1]
+    most, tiny = one.friction * N, 1e-7 * size
+    if np.any(N < -tiny) or np.any(np.abs(T) > most * (1.0 + 1e-7) + tiny):
+        raise Wrong("a force of contact is outside the cone of friction")
+    slips = ~np.asarray(on.sticking, bool) & (N > 1e-3 * N.max())
+    if one.friction and np.any(np.abs(np.abs(T) - most)[slips] > 1e-5 * most.max()):
+        raise Wrong("a point slips, and friction is not at its limit")
+
+
 def verdict_of(system, state, K, scale):
     """What the dense eigenvalues say, whether K is symmetric, and the lowest of them."""
     free = np.nonzero(system.constraints.free)[0]
@@ -446,7 +656,7 @@ def verdict_of(system, state, K, scale):
     A = d[:, None] * K[np.ix_(free, free)] * d
     symmetric = np.abs(A - A.T).max(initial=0.0) < 1e-8 * np.abs(A).max(initial=1.0)
     if system.constraints.m:
-        Z = null_space(system.constraints.jacobian(state.u, state.load)[:, free] * d)
+        Z = null_space(system.constraints.jacobian(state.u, time_of(state))[:, free] * d)
         A = Z.T @ A @ Z
     values = np.linalg.eigvalsh(0.5 * (A + A.T))
     # the diagonal is 1; bending of a slender beam is small beside it
@@ -484,10 +694,13 @@ def build(script, compiled=True):
 
 
 def solve(script, compiled):
-    """(scene, state or None, the error's name)."""
+    """(scene, the last state, and the one before on a path, or None, the error's name)."""
     try:
         scene, options = build(script, compiled)
-        return scene, scene.solve_static(**options), ""
+        if "increments" in options:
+            history = scene.run([1.0, 2.0], **options)
+            return scene, (history.state(-1), history.state(-2)), ""
+        return scene, (scene.solve_static(**options),), ""
     except AncfError as error:
         return None, None, type(error).__name__
 
@@ -501,7 +714,7 @@ def run(script, compare=False, seconds=120):
             warnings.simplefilter("error")
             _own_warnings()
             scene, state, error = solve(script, True)
-            outcome = error or check(scene, state)
+            outcome = error or check(scene, *state)
             if compare:
                 return outcome, _compared(script, state, error)
             return outcome, ""
@@ -529,12 +742,13 @@ def _compared(script, state, error):
     scene, plain, plain_error = solve(script, False)
     if plain_error != error:
         if plain is not None:
-            check(scene, plain)
+            check(scene, *plain)
         return "" if "ConvergenceError" in (error, plain_error) else (
             f"compiled: {error or 'solved'}, in NumPy: {plain_error or 'solved'}")
     if plain is None:
         return ""
-    check(scene, plain)
+    check(scene, *plain)
+    plain, state = plain[0], state[0]
     M, both = scene.system.mass.tocsc(), np.stack([plain.u - state.u, state.u], axis=1)
     # of the displacement: sixth derivatives are known to fewer digits, and move the axis little
     apart, size = np.sqrt(np.sum(both * (M @ both), axis=0))
@@ -572,7 +786,8 @@ def main():
         print(f"{n:6}  {outcome}")
     for number, outcome, wrong, script in bad[:20]:
         print(f"\n# scene {number} of seed {arguments.seed}: {outcome}: {wrong}\n{HEADER}"
-              f"COMPILED = True\n{script}state = scene.solve_static(**options)")
+              f"COMPILED = True\n{script}end = scene.run([1, 2], **options) if 'increments' in "
+              "options else scene.solve_static(**options)")
     return 1 if bad else 0
 
 

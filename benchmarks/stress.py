@@ -15,13 +15,15 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "validation"))
 import exact
 
 from skfem_ancf import (Beam, ConvergenceError, ElasticPlastic, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, MeshBeam, ModelWarning, NeoHookean,
-                        Prony, Scene, StVenantKirchhoff)
+                        Prony, Scene, StVenantKirchhoff, Voce)
+from skfem_ancf.actions.forces import ForceElement, point
 from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.core.progress import progress_bar
 from skfem_ancf.core.quadrature import gauss
@@ -553,6 +555,70 @@ def histories(quick, out):
             M = [x.multipliers[0] for x in scene.run([1e-6 * tau, 2.0 * tau], increments=4)]
             yield Row(check, f"relaxation, {name}, time {tau:g}", "relative error of the moment",
                       M[-1] / M[4] / (1.0 - 0.4 * (1.0 - np.exp(-2.0))) - 1.0, 1e-5)
+        # a bar between walls is heated, cooled and heated: isotropic, saturating, kinematic
+        def path(t):
+            return np.interp(t, range(4), (0.0, 1.0, -1.0, 0.5))
+
+        for unit in (1.0,) if quick else (1e-6, 1.0, 1e9):
+            E, y, alpha = 2e11 * unit, 2.5e8 * unit, 1.2e-5
+            for case, h, k in (("isotropic", (0.0, 1.0, 0.01 * E), 0.0),
+                               ("Voce", (0.5 * y, 300.0, 0.0), 0.0),
+                               ("kinematic", (0.0, 1.0, 0.0), 0.02 * E)):
+                law = ElasticPlastic(E, 0.0, y, Voce(*h), k, thermal_expansion=alpha)
+                scene = Scene(Beam(line(2, 0.05, 0.1), element, law, WIDTH))
+                scene.temperature(200.0, amplitude=path)
+                for end in ("left", "right"):
+                    scene.clamp(end, thickness="free")
+                run = scene.run([1.0, 2.0, 3.0], increments=3)
+                error = np.array([x.stress((0.03, 0.0))[0] for x in run]) - fibre(
+                    -200.0 * alpha * path(run.t), E, y, h, k)
+                yield Row(check, f"{case} cycle, {name}, E times {unit:g}", "relative error of the "
+                          "stress", np.abs(error).max() / y, 1e-7)
+        # a slider that remembers where it is, dragged there and back: a loop of 4 F (d - F / k)
+        for unit in (1.0,) if quick else (1e-6, 1.0, 1e9):
+            F = 1e-3 * unit
+            scene = Scene(Beam(line(2, 0.02), element, StVenantKirchhoff(1e7 * unit, 0.0), WIDTH))
+            scene.clamp("left", thickness="free").add(Slider(1e2 * F, F))
+            scene.fix("right", "r^2", displacement=lambda t: 0.05 * np.interp(
+                t, range(4), (0.0, 1.0, -1.0, 1.0)))
+            run = scene.run([1.0, 3.0], increments=10)
+            yield Row(check, f"slider, {name}, F = {F:g}", "relative error of the loop",
+                      (run.dissipated[-1] - run.dissipated[10]) / (4.0 * F * 0.04) - 1.0, 1e-6)
+
+
+def fibre(strains, E, y, hardening, kinematic):
+    """Stresses of a fibre that yields, at strains one after the other."""
+    (Q, b, H), flow, back, p, out = hardening, 0.0, 0.0, 0.0, []
+    for e in strains:
+        x = E * (e - flow) - back
+
+        def excess(g, x=x, p=p):
+            return abs(x) - (E + kinematic) * g - y - Q * (1 - np.exp(-b * (p + g))) - H * (p + g)
+
+        g = np.sign(x) * (brentq(excess, 0.0, abs(x) / E, xtol=1e-18) if excess(0.0) > 0.0 else 0.0)
+        flow, back, p = flow + g, back + kinematic * g, p + abs(g)
+        out.append(E * (e - flow))
+    return np.array(out)
+
+
+class Slider(ForceElement):
+    """A spring of stiffness k to a place along y that gives way at a force."""
+
+    def __init__(self, k, most):
+        self.k, self.most = k, most
+
+    def bind(self, layout):
+        return [point(layout, None, "right")]
+
+    def start(self):
+        return np.zeros(1)
+
+    def evaluate(self, x, v, t, history, dt):
+        F = np.clip(self.k * (x[0, 1] - history[0]), -self.most, self.most)
+        return np.array([[0.0, -F]]), np.array([x[0, 1] - F / self.k])
+
+    def potential(self, x, history):
+        return 0.5 * self.k * (x[0, 1] - history[0]) ** 2
 
 
 def leaves(element, h, E, n, friction=0.0, origin=0.0):

@@ -65,7 +65,7 @@ options = {{}}
 def test_a_wrong_equilibrium_is_seen(formulation):
     script = PLAIN.format(formulation=formulation)
     assert fuzz.run(script, compare=True) == ("stable", "")
-    scene, state, _ = fuzz.solve(script, False)
+    scene, (state, *_), _ = fuzz.solve(script, False)
     state = state.replace(u=state.u * (1 + 1e-3))
     with pytest.raises(fuzz.Wrong, match="residual"):
         fuzz.check(scene, state)
@@ -75,9 +75,38 @@ def test_leaves_that_touch_are_checked():
     """They are in equilibrium, and a displacement that is none is seen."""
     script = fuzz.draw_leaves(fuzz.Dice((7, 2)))
     assert "contact" in script and fuzz.run(script) == ("in contact", "")
-    scene, state, _ = fuzz.solve(script, False)
+    scene, (state, *_), _ = fuzz.solve(script, False)
     with pytest.raises(fuzz.Wrong):
         fuzz.check(scene, state.replace(u=state.u * (1 + 1e-3)))
+
+
+def test_points_that_yield_are_checked():
+    """On their way back: what is not on the yield surface is seen, and hardening that is wrong."""
+    for beam in ("ElementBeamCable(3)", "ElementBeamANCF(2)"):
+        script = PLAIN.replace("ELEMENTS[\"ancf-2\"](), StVenantKirchhoff(1e6, 0.3, 1.0)", (
+            f"{beam}, ElasticPlastic(1e6, 0.3, 1e4, 1e4, 1e5)")).format(formulation="assumed")
+        script = script.replace("at=(1.0, 0.0)", "at=(1.0, 0.0),\n    amplitude=lambda t: "
+                                "0.6 * np.interp(t, [0, 1, 2], [0, 1, -1])")
+        script = script.replace("{}", "{'increments': 4}")
+        assert fuzz.run(script) == ("stable", "")
+        scene, (state, before), _ = fuzz.solve(script, False)
+        past = fuzz.past_of(state, 0)
+        assert np.any(past[6] > fuzz.past_of(before, 0)[6]) and np.any(past[6] == 0.0)
+        n = past[0].size
+        for k, factor in ((0, 1.01), (3, 0.99), (6, 1.01)):
+            memory = state.memory.copy()
+            memory[k * n:(k + 1) * n] *= factor
+            with pytest.raises(fuzz.Wrong):
+                fuzz.check(scene, state.replace(memory=memory), before)
+
+
+def test_an_obstacle_that_a_beam_is_pressed_on_is_checked():
+    script = fuzz.draw_pressed(fuzz.Dice(6))
+    assert "friction=0.5" in script and fuzz.run(script) == ("in contact", "")
+    scene, (state, before), _ = fuzz.solve(script, False)
+    assert len(state.contact()) > 0
+    with pytest.raises(fuzz.Wrong):
+        fuzz.check(scene, state.replace(u=state.u * (1 + 1e-3)), before)
 
 
 @pytest.mark.parametrize("load, verdict", [("(-0.14, 0.0)", "stable"), ("(-0.2, 0.0)", "unstable")])
