@@ -281,7 +281,7 @@ class Remembering:
         return other
 
     def _at(self, history, span):
-        self._values, self.history, self.span = history, history.view(), span
+        self.values, self.history, self.span = history, history.view(), span
         self.history.flags.writeable = False
 
     def evaluate(self, x: Array, v: Array, t: float, dt: float | None = None
@@ -335,7 +335,7 @@ class Remembering:
         mean = self.mean_force(x, y, t - 0.5 * dt, dt or TINY)
         lost = -np.sum(mean * (y - x)) + (self.potential_at(x, t) or 0.0) - (
             self.potential_at(y, t, after) or 0.0)
-        self._values[:] = after
+        self.values[:] = after
         return float(lost) if self.element.dissipates else 0.0
 
     def settle(self, u0: Array, u: Array, t: float) -> float:
@@ -346,23 +346,23 @@ class Remembering:
     def sample(self, u: Array, v: Array, t: float, first: bool) -> None:
         """Set the history after a measurement at u and v (N,), if due; ``first`` starts over."""
         w = np.array([link(v) - link.start for link in self.element.links])
-        self._values[:] = self.element.sample(positions(self, u), w, t,
+        self.values[:] = self.element.sample(positions(self, u), w, t,
                                               self.start if first else self.history)
 
     def take_over(self, other: Remembering) -> None:
         """Set the history to that of the same element in other equations."""
-        self._values[:] = other.history
+        self.values[:] = other.history
 
     def relax(self, u: Array) -> None:
         """Set a history with less stiffness, of contact between members at u (N,)."""
         if hasattr(self.element, "relaxed"):
-            self._values[:] = self.element.relaxed(positions(self, u), self.history)
+            self.values[:] = self.element.relaxed(positions(self, u), self.history)
 
     def correct(self, u: Array, t: float) -> bool:
         """Set a history with which to repeat an increment that ends at u (N,); False for none."""
         new = self.element.corrected(positions(self, u), t, self.history)
         if new is not None:
-            self._values[:] = new
+            self.values[:] = new
         return new is not None
 
 

@@ -58,6 +58,12 @@ def add_each(out, at, x):
 
 
 @primitive("skfem_ancf.core.loops")
+def least_each(out, at, x):
+    """out[at] = min(out[at], x), with repeated indices."""
+    np.minimum.at(out, at, x)
+
+
+@primitive("skfem_ancf.core.loops")
 def add_products(out, at, v, x, i):
     np.add.at(out, at, v * x[i])
 

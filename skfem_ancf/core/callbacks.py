@@ -82,7 +82,7 @@ def owner(handle: int) -> Any:
 
 
 #: What :func:`call_custom` asks for.
-FORCE, MEAN_FORCE, STIFFNESS, JOINTS, ELEMENTS, POSES = range(6)
+FORCE, MEAN_FORCE, STIFFNESS, JOINTS, ELEMENTS, POSES, SEARCHES = range(7)
 
 
 @primitive("skfem_ancf.core.loops")
@@ -100,8 +100,10 @@ def call_custom(callback, handle, what, t, x, a, b, out):
         called.add_custom_joints(what, t, a, b, out)
     elif callback == ELEMENTS:
         called.forces.add_custom(what, t, x, a, b, out)
-    else:
+    elif callback == POSES:
         called.put(t, x, out)
+    else:
+        called.search(a.view(complex))
 
 
 @primitive("skfem_ancf.core.loops")

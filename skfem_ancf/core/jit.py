@@ -33,7 +33,7 @@ SCALARS = {int: types.int64, float: types.float64, bool: types.boolean, type(Non
            None: types.void}
 #: ctypes of functions in Python.
 _C: dict[Any, Any] = {int: c_int64, float: c_double, None: None}
-_DTYPES = {"f": types.float64, "i": types.int64}
+_DTYPES = {"f": types.float64, "i": types.int64, "c": types.complex128}
 #: Exceptions of a damaged cache.
 _SPOILT = RuntimeError, OSError, EOFError, pickle.PickleError, KeyError, ValueError
 _registered: set[Any] = set()
@@ -184,7 +184,7 @@ def _read(context, builder, record, pointer, name):
     array = context.make_array(kind)(context, builder)
     array.data = builder.inttoptr(load(place(at)), array.data.type)
     shape = [load(place(at + 1 + k)) for k in range(kind.ndim)]
-    bytes_each = context.get_constant(types.intp, 8)
+    bytes_each = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
     size, strides = context.get_constant(types.intp, 1), []
     for n in reversed(shape):
         strides.insert(0, builder.mul(bytes_each, size))

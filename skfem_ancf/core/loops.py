@@ -351,6 +351,15 @@ def add_each(out, at, x):
         out[at[k]] += x[k]
 
 
+def vector(x, y):
+    return complex(x, y)
+
+
+def least_each(out, at, x):
+    for k in range(at.size):
+        out[at[k]] = min(out[at[k]], x[k])
+
+
 def add_products(out, at, v, x, i):
     for k in range(at.size):
         out[at[k]] += v[k] * x[i[k]]
@@ -418,3 +427,7 @@ def log1p(x):
 
 def everywhere(condition):
     return condition
+
+
+def where(condition, x, y):
+    return x if condition else y

@@ -31,6 +31,10 @@ F3: TypeAlias = Annotated[np.ndarray, "f3"]
 I1: TypeAlias = Annotated[np.ndarray, "i1"]
 I2: TypeAlias = Annotated[np.ndarray, "i2"]
 I3: TypeAlias = Annotated[np.ndarray, "i3"]
+#: The same of complex numbers, which stand for vectors in the plane.
+C1: TypeAlias = Annotated[np.ndarray, "c1"]
+C2: TypeAlias = Annotated[np.ndarray, "c2"]
+C3: TypeAlias = Annotated[np.ndarray, "c3"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -99,6 +103,18 @@ def indices(*ends):
 def column(x):
     """``x[:, None]`` in NumPy, x in compiled code."""
     return x[:, None]
+
+
+@primitive("skfem_ancf.core.loops")
+def where(condition, x, y):
+    """x where a condition holds, else y; sums with factors 0 and 1 lose digits when reordered."""
+    return np.where(condition, x, y)
+
+
+@primitive("skfem_ancf.core.loops")
+def everywhere(condition):
+    """True if a condition holds at all points."""
+    return np.all(condition)
 
 
 @source

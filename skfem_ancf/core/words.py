@@ -13,7 +13,7 @@ import numpy as np
 
 
 _DTYPES, _FLOAT, _INTEGER = (
-    frozenset([np.dtype(float), np.dtype(np.int64)]), Struct("d"), Struct("q"))
+    frozenset([np.dtype(float), np.dtype(np.int64), np.dtype(complex)]), Struct("d"), Struct("q"))
 #: A ctypes array that may lie anywhere.
 _NOTHING = c_char * 0
 

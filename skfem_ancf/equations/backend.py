@@ -34,7 +34,7 @@ COMPILING = {"StrainTables": 8.0, "cables": 1.0, "own": 1.0, "elements": 7.0, "c
              "statics": 3.0, "motion": 9.0, "damping": 1.0, "rows": 1.0, "history": 1.0,
              "equilibrium": 1.5, "tangent": 0.5, "force": 0.2, "linearised": 0.2, "steps": 1.5}
 #: The same for functions that are compiled on first use only.
-WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
+WHERE_USED = {"laws": 3.0, "pairs": 8.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
               "mean_force": 1.0, "viscous_force": 1.0}
 LOADING = 0.5
 SECONDS = {**COMPILING, **WHERE_USED}

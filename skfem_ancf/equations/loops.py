@@ -12,13 +12,23 @@ from ..core.code_cache import NotCompiled
 from ..core import F1, F3, is_builtin
 from ..core.jit import address, caller, compiled, reader
 from ..core.words import Words
+from ..actions.contact.pairs import Candidates, PairTables
 from .tables import Equations
 
 _read, _call_law = reader(CompiledTables), caller(F1, F3, F3)
+_read_pair, _read_found = reader(PairTables), reader(Candidates)
 
 
 def tables_of(body, k):
     return _read(body.packs[k])
+
+
+def pair_tables(tables, k):
+    return _read_pair(tables.pairs[k])
+
+
+def candidates_of(t):
+    return _read_found(t.found[0])
 
 
 def evaluate_points(law, strain, out):
@@ -70,6 +80,7 @@ def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
     viscous, copies = (body if x is plain.body else _flat_body(x, words)
                        for x in (plain.viscous, plain.copies))
     found = plain._replace(body=body, viscous=viscous, copies=copies, loads=loads,
+                           forces=_flat_forces(plain.forces, words),
                            factors=plain.K._replace(flat=np.empty(plain.K.flat.size)))
     return found, Words(found), words
 
@@ -77,8 +88,18 @@ def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
 def flat_after(flat: tuple[Equations, Words, list[Words]], plain: Equations
                ) -> tuple[Equations, Words, list[Words]]:
     """The same with the history of other equations."""
-    found = flat[0]._replace(forces=plain.forces, history=plain.history, span=plain.span)
-    return found, Words(found), flat[2]
+    words = list(flat[2])
+    found = flat[0]._replace(forces=_flat_forces(plain.forces, words), history=plain.history,
+                             span=plain.span)
+    return found, Words(found), words
+
+
+def _flat_forces(forces, words):
+    if not forces.paired:
+        return forces
+    found = list(map(Words, forces.pairs))
+    words += found
+    return forces._replace(pairs=np.array([x.address for x in found], dtype=np.int64))
 
 
 def _flat_body(body, words):

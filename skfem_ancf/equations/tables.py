@@ -167,6 +167,7 @@ class Tables:
                 "joints": self.system.constraints.m > 0, "elements": forces.number > 0,
                 "laws": any(t.law.kind != LINEAR for t in packs),
                 "contacts": forces.contacts.number > 0,
+                "pairs": forces.paired > 0,
                 "eigenstrains": len(self.plain.loads.eigenstrains) > 0}
         return [name for name, yes in used.items() if yes]
 
@@ -211,6 +212,7 @@ class Tables:
             tables._user_defined = None
         forces = plain.forces._replace(
             contacts=system.forces.contacts.tables, clear=system.forces.clear,
+            pairs=system.forces.pairs,
             custom=tables.handle if plain.forces.custom else 0)
         tables.plain = plain._replace(
             body=body, viscous=body if plain.viscous is plain.body else plain.viscous,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import Array, Law, primitive, refuse, source
+from ..core import Array, Law, everywhere, primitive, refuse, source
 from .pointwise import PointwiseMaterial
 
 
@@ -13,12 +13,6 @@ def log1p(x):
     """ln (1 + x); NaN for x < -1."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.log1p(x)
-
-
-@primitive("skfem_ancf.core.loops")
-def everywhere(condition):
-    """True if a condition holds at all points."""
-    return np.all(condition)
 
 
 @source

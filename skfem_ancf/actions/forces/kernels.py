@@ -12,11 +12,12 @@ from ...core.band import clear, dot
 from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import ELEMENTS, POSES, call_custom
 from ...core import F1, I1, MADE, apart, indices, shaped, source
-from ..tables import add_products
-from ..contact.kernels import of_contacts, untouched
-from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SETTLE,
-                              TANGENT, TURNS, ContactTables, Question, RESISTING as RUBBING,
-                              is_clear)
+from ..tables import add_each, add_products
+from ..contact.kernels import FAR, of_contacts, untouched
+from ..contact.pairs import pair_accept, pair_force, pair_tables
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, MARGIN, RATE,
+                              SAFE, SETTLE, TANGENT, TURNS, ContactTables, Question,
+                              RESISTING as RUBBING, is_clear, set_clear)
 
 #: Kinds of elements.
 SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))
@@ -52,7 +53,9 @@ class ForceTables(NamedTuple):
     positions in the band, derivatives and weights; ``row_at, row_of`` those of elements that couple
     distant DOFs. ``custom`` is the handle of user-defined elements or 0, of which ``changing``
     change their pattern; ``clear`` says where they do nothing, see
-    :func:`~skfem_ancf.actions.contact.tables.is_clear`.
+    :func:`~skfem_ancf.actions.contact.tables.is_clear`. ``paired`` of these are contact of members,
+    with ``pairs``: their :class:`~skfem_ancf.actions.contact.pairs.PairTables`, or the addresses of
+    these in compiled code.
     """
 
     start: F1
@@ -72,6 +75,8 @@ class ForceTables(NamedTuple):
     contacts: ContactTables
     changing: int
     clear: F1
+    paired: int
+    pairs: I1
 
 
 @source
@@ -150,9 +155,31 @@ def add_elastic_force(tables, t, span, u0, u1, f):
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
     if tables.changing > 0 and not at_rest(tables, u0, u1):
-        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, span, u0, u1, f)
+        _add_changing(tables, t, span, u0, u1, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
+
+
+@source
+def _add_changing(tables, t, span, u0, u1, f):
+    """Add the mean force of elements whose stiffness changes its pattern."""
+    least, found, total = FAR, np.empty(1), f.view(np.complex128)
+    if tables.changing > tables.paired:
+        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, span, u0, u1, f)
+        least = tables.clear[MARGIN] / SAFE
+    for k in range(tables.paired):
+        pair = pair_tables(tables, k)
+        out = np.zeros(pair.used.size, np.complex128)
+        pair_force(pair, _used(pair, u0), _used(pair, u1), span == 0.0, out, found)
+        least = min(least, found[0])
+        add_each(total, pair.used, out)
+    set_clear(tables.clear, u1, least)
+
+
+@source
+def _used(pair, u):
+    """The pairs of degrees of freedom of surfaces, as complex numbers."""
+    return u.view(np.complex128)[pair.used]
 
 
 @source
@@ -160,7 +187,7 @@ def add_resisting_force(tables, t, u, v, f):
     """Add the velocity-dependent part of the force."""
     if tables.start.size > 0:
         _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
-    if tables.changing > 0 and not at_rest(tables, u, u):
+    if tables.changing > tables.paired and not at_rest(tables, u, u):
         call_custom(ELEMENTS, tables.custom, np.int64(PUSHED_BACK), t, 0.0, u, v, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
@@ -211,7 +238,7 @@ def contact_work(tables, t, u, du, f):
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(FORCE, t), u, u, f)
     if tables.changing > 0:
-        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
+        _add_changing(tables, t, 0.0, u, u, f)
     work = dot(f, du)
     clear(f)
     return work
@@ -260,7 +287,11 @@ def settle_elements(tables, t, u0, u1, v, out):
         vectors_of(tables, u1, 1.0, w[:n])
         vectors_of(tables, v, 0.0, w[n:])
         call_custom(ELEMENTS, tables.custom, np.int64(SETTLED), t, 0.0, y, w, out)
-    if tables.changing > 0 and not at_rest(tables, u0, u1):
+    for k in range(tables.paired):
+        pair = pair_tables(tables, k)
+        if pair.friction > 0.0 and not at_rest(tables, u0, u1):
+            out[0] += pair_accept(pair, _used(pair, u0), _used(pair, u1), pair.history)
+    if tables.changing > tables.paired and not at_rest(tables, u0, u1):
         n = u0.size
         w = np.empty(2 * n)
         for i in indices(n):

@@ -145,6 +145,7 @@ class Forces:
         for element, dofs in self.changing:
             if hasattr(element, "least_gap"):
                 weights[dofs] = np.maximum(weights[dofs], element.weights)
+        self._pair()
         self.clear, u = clear_table(weights), np.zeros(N)
         if self.changing:
             set_clear(self.clear, u, self._least_gap(u))
@@ -160,6 +161,16 @@ class Forces:
         self.resists = (any(e.resists for e in (*self.custom, *(e for e, _ in self.changing)))
                         or any(c > 0.0 for c in damping)
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
+
+    def _pair(self, fresh=False):
+        """Set the tables of contact of members, and the other elements that change their pattern;
+        ``fresh`` with a search of their own."""
+        paired = [(e, at) for e, at in self.changing if hasattr(e, "broad_search")]
+        self._called = [(e, at) for e, at in self.changing if not hasattr(e, "broad_search")]
+        self._searches = [e.broad_search.fresh() if fresh else e.broad_search for e, _ in paired]
+        self.pairs: Any = tuple(
+            search.tables._replace(used=at[::2] // 2, history=e.values)
+            for search, (e, at) in zip(self._searches, paired))
 
     def _couple(self, blocks, places):
         """Find the vectors, ``start + B u``, and the entries of all derivatives by two of them."""
@@ -201,6 +212,7 @@ class Forces:
         of = dict(zip(map(id, self.remembering), new))
         other.remembering, other.custom = new, [of.get(id(e), e) for e in self.custom]
         other.changing = [(of.get(id(e), e), at) for e, at in self.changing]
+        other._pair(fresh=True)
         other.clear = self.clear.copy()
         if memory.size:
             other.contacts = self.contacts.after(memory)
@@ -221,7 +233,7 @@ class Forces:
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._border[0], self._border[1],
             handle if self.custom or self.changing else 0, self.contacts.tables,
-            len(self.changing), self.clear)
+            len(self.changing), self.clear, len(self.pairs), self.pairs or NONE)
 
     def acting_rows(self, u: Array, t: float) -> tuple[Array, Array]:
         """Derivatives of positions of concentrated elements, and forces of items, (k, N) each."""
@@ -416,7 +428,7 @@ class Forces:
         if what == ALONG_PUSHING:
             i, j, values = self.changing_entries(t, u, u)
             out[0] += values @ (w[i] * w[j])
-        for element, at in self.changing:
+        for element, at in self.changing if what == ALONG_PUSHING else self._called:
             x, y = (z[at].reshape(-1, 2) for z in (u, w))
             if what == PUSHING:
                 same, span = np.array_equal(x, y), [factor] * isinstance(element, Remembering)
@@ -429,12 +441,12 @@ class Forces:
             elif what == ACCEPTING and isinstance(element, Remembering):
                 out[0] += element.accept(x, y, w[len(u):][at].reshape(-1, 2), t)
         if what == PUSHING:
-            set_clear(self.clear, w, self._least_gap(w))
+            set_clear(self.clear, w, self._least_gap(w, self._called))
 
-    def _least_gap(self, u):
+    def _least_gap(self, u, elements=None):
         """The least gap of changing elements; 0 for unknown."""
         return min(element.least_gap(u[at].reshape(-1, 2)) if hasattr(element, "least_gap") else 0.0
-                   for element, at in self.changing)
+                   for element, at in elements or self.changing)
 
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
@@ -476,4 +488,4 @@ _X, _I = np.zeros(0), np.zeros(0, np.int64)
 #: For scenes without force elements.
 NO_FORCES = constant(ForceTables(
     _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS, 0,
-    _X))
+    _X, 0, _I))

@@ -3,92 +3,133 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from copy import copy
+from math import perm
+from typing import Any
 
 import numpy as np
 import scipy
 
 from ...core import Array
+from ...core.callbacks import handle_of
+from ...core.words import Words
+from ..contact.pairs import (APART, Candidates, PairTables, cross, dot, facing,
+                             together)
 from ..contact.tables import weights_of_motion
-from .gap import Surfaces, cross, dot
+from .facets import Facets
 
 #: Distance of seeds along facets, largest number on a facet, and the distance for which a list of
 #: candidates is enough, in heights; larger ones tried where nothing is near.
 SEEDS, MOST, SKIN = 1.2, 10, 0.5
 SKINS = 2.0, 5.0, 12.0, 30.0, 75.0
-#: No contact of a beam with itself, or with a beam that it is joined to, within so many heights.
-APART = 3.0
 #: Distance of axes that are joined, in heights; parts of an element in which they are searched.
 JOINED, FINE = 1e-3, 8
 #: Sine of the angle of parallel segments.
 PARALLEL = 1e-6
 #: How much further points between those of a rule may move.
 BETWEEN = 1.1
-#: Number of states of which pairs are kept.
-KEPT = 3
 #: Parts of an element in which crossing axes are searched.
 COARSE = 2
-#: Largest penetration, in heights; a point as deep as the height lies on the other face.
-DEEPEST = 0.75
-#: Largest cosine of the angle between outer normals of surfaces that touch.
-OPPOSED = -0.2
 
 
-class Candidates(NamedTuple):
-    """Pairs of points and facets, a guess of zeta, and where all points were at the search. It is
-    complete until points or facets have moved by half of ``skin``."""
-
-    p: Array
-    e: Array
-    zeta: Array
-    seeds: tuple[Array, Array]
-    x: Array
-    skin: float
+def powers(zeta: Array, n: int, order: int) -> Array:
+    """A derivative of the powers 0 to n - 1 of zeta, (len(zeta), n)."""
+    out = np.zeros((len(zeta), n))
+    for k in range(order, n):
+        out[:, k] = zeta ** (k - order) * perm(k, order)
+    return out
 
 
-class Touching(NamedTuple):
-    """Pairs of points and facets in contact, (n,) each: their closest points and gaps. ``clear`` is
-    the least gap of all if there are none."""
+class Surfaces:
+    """The facets of a scene, with the weights of the points of their surfaces."""
 
-    p: Array
-    e: Array
-    zeta: Array
-    gap: Array
-    clear: float
+    def __init__(self, facets: Facets) -> None:
+        self.facets = f = facets
+        self.points = [self.curve(f.of, f.zeta, order) for order in (0, 1)]
+        self.shift = (f.sides * f.offsets)[f.of]
+        self.dofs = f.dofs[f.of]
+
+    def curve(self, e: Array, zeta: Array, order: int) -> tuple[Array, Array]:
+        """Weights (n, B) and constant part (n,) of a derivative of facets by zeta."""
+        V = powers(zeta, self.facets.starts.shape[1], order)
+        return (np.einsum("nbk,nk->nb", self.facets.weights[e], V),
+                np.einsum("nk,nk->n", self.facets.starts[e], V))
+
+    def weights(self, e: Array, zeta: Array) -> tuple[Array, Array]:
+        """Weights of places and slopes of facets, (B, n) each."""
+        return self.curve(e, zeta, 0)[0].T, self.curve(e, zeta, 1)[0].T
+
+    def along(self, e: Array, zeta: Array, order: int, z: Array) -> Array:
+        """A derivative of facets by zeta at displacements z, (n,)."""
+        weights, start = self.curve(e, zeta, order)
+        return start + np.einsum("nb,nb->n", weights, z[self.facets.dofs[e]])
+
+    def outside(self, z: Array) -> tuple[Array, Array]:
+        """Points of the surfaces and their outer normals, (P,) each."""
+        r, t = (start + np.einsum("nb,nb->n", w, z[self.dofs]) for w, start in self.points)
+        n = 1j * t / np.abs(t)
+        return r + self.shift * n, self.facets.sides[self.facets.of] * n
 
 
 class Search:
-    """Finds the facet that each point is nearest to. ``allowed`` (M, M) says which members may
-    touch; ``begins`` (P,) is the gap at which the pressure begins. ``solids`` are numbers of
-    members without axes, and functions that say which places of the reference configuration are
-    inside."""
+    """Finds the facet that each point is nearest to.
 
-    def __init__(self, surfaces: Surfaces, allowed: Array, solids: Sequence[Any] = ()) -> None:
-        self.surfaces, self.allowed, self.begins = surfaces, allowed, np.inf
-        f, self._known = surfaces.facets, None
-        self._last: list[tuple[Array, Touching]] = []
-        (N, _), (D, slope) = surfaces.points
+    ``allowed`` (M, M) says which members may touch; ``solids`` are numbers of members without axes,
+    and functions that say which places of the reference configuration are inside; ``numbers`` are
+    stiffness or None, width of the transition in heights, and coefficient of friction. ``tables``
+    are those for kernels.
+    """
+
+    def __init__(self, surfaces: Surfaces, allowed: Array, solids: Sequence[Any],
+                 numbers: tuple[float | None, float, float]) -> None:
+        self.surfaces, self.allowed = surfaces, allowed
+        f, ((N, _), (D, slope)) = surfaces.facets, surfaces.points
+        n = int(f.dofs.max()) + 1
         self.weights = BETWEEN * weights_of_motion(
-            np.abs(N) + 2.0 * np.abs(surfaces.shift / slope)[:, None] * np.abs(D), surfaces.dofs,
-            int(f.dofs.max()) + 1)
+            np.abs(N) + 2.0 * np.abs(surfaces.shift / slope)[:, None] * np.abs(D), surfaces.dofs, n)
         self.height = h = float(np.min(f.heights))
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
         self._seed_zeta = (2.0 * np.arange(m) + 1.0) / m - 1.0
         self._near = 0.6 * f.lengths / m + f.offsets
         self.joined = self._joined(solids)
+        penalty, width, friction = numbers
+        of_facets = {name: np.ascontiguousarray(getattr(f, name), dtype=kind) for kind, names in (
+            (float, "sides offsets places lengths spans heights firmness zeta areas"),
+            (np.int64, "members chains curves of")) for name in names.split()}
+        if penalty is not None:
+            of_facets["firmness"] = np.full(len(f.sides), penalty)
+        self.tables = PairTables(
+            used=np.arange(n), dofs=_packed(f.dofs.T, np.int64),
+            weights=_packed(f.weights.transpose(1, 2, 0), complex),
+            starts=_packed(f.starts.T, complex), near=self._near,
+            joined=_packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
+            point_dofs=_packed(surfaces.dofs.T, np.int64), N=_packed(N.T, complex),
+            D=_packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
+            found=np.zeros(1, np.int64), seen=np.zeros(n, complex), moves=self.weights,
+            skin=np.zeros(1), start=facing(0, 0, 0), start_at=np.zeros(0, complex),
+            history=np.zeros(1), **of_facets)
+        self.fresh(False)
 
-    def candidates(self, z: Array) -> tuple[Candidates, Array, Array]:
-        """The candidates at displacements z, with points and normals of the surfaces there."""
-        x, n = self.surfaces.outside(z)
-        known = self._known
-        if known is None or np.max(np.abs(x - known.x)) > 0.5 * known.skin:
-            self._known = known = self._search(x, z, SKIN * self.height)
-            for skin in SKINS if not len(known.p) else ():  # how far may it move unseen?
-                wide = self._search(x, z, skin * self.height)
-                if len(wide.p):
-                    break
-                self._known = known = wide
-        return known, x, n
+    def fresh(self, other: bool = True) -> Search:
+        """Forget what was found, or make a copy that has found nothing."""
+        one, t, n = copy(self) if other else self, self.tables, len(self.weights)
+        one.tables = t._replace(
+            handle=handle_of(one), found=np.zeros(1, np.int64), seen=np.zeros(n, complex),
+            skin=np.zeros(1), start=facing(t.starts.shape[0], t.starts.shape[1], len(t.of)),
+            start_at=np.full(n, np.nan + 0j))
+        return one
+
+    def search(self, z: Array) -> None:
+        """Find the :class:`Candidates` at displacements z; the callback of kernels."""
+        x, skin = self.surfaces.outside(z)[0], SKIN
+        known = self._search(x, z, skin * self.height)
+        for wider in SKINS if not len(known.p) else ():  # how far may it move unseen?
+            wide = self._search(x, z, wider * self.height)
+            if len(wide.p):
+                break
+            known, skin = wide, wider
+        t, self.candidates, self._words = self.tables, known, Words(known)
+        t.found[0], t.skin[0], t.seen[:] = self._words.address, skin * self.height, z
 
     def _search(self, x, z, skin):
         f, m = self.surfaces.facets, len(self._seed_zeta)
@@ -99,77 +140,17 @@ class Search:
         found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
         p, k, far = found["i"], found["j"], found["v"]
         which = (far < self._near[e[k]] + self.height + skin) & self.allowed[
-            f.members[f.of[p]], f.members[e[k]]] & ~self._together(p, e[k], zeta[k], f.lengths)
+            f.members[f.of[p]], f.members[e[k]]] & ~together(
+            self.tables, p, e[k], zeta[k], 1.0)
         p, k, far = p[which], k[which], far[which]
         order = np.lexsort((far, e[k], p))
         p, k = p[order], k[order]
         first = np.append(True, (np.diff(p) != 0) | (np.diff(e[k]) != 0))[:len(p)]
         p, k = p[first], k[first]
-        return Candidates(p, e[k], zeta[k], self.surfaces.curve(e[k], zeta[k], 0), x,
-                          skin)
-
-    def touching(self, z: Array) -> Touching:
-        """The pairs with a gap below the one at which the pressure begins."""
-        # The last ones are kept: forces and stiffnesses ask for the same states in turn.
-        for at, found in self._last:
-            if np.array_equal(at, z):
-                return found
-        found = self._touching(z)
-        self._last = [*self._last[1 - KEPT:], (z.copy(), found)]
-        return found
-
-    def forget(self) -> None:
-        """Forget the last states."""
-        self._last = []
-
-    def _touching(self, z):
-        known, x, n = self.candidates(z)
-        beyond = known.skin + self.height - 2.0 * float(np.max(np.abs(x - known.x)))
-        weights, start = known.seeds
-        y = start + np.einsum("nb,nb->n", weights, z[self.surfaces.facets.dofs[known.e]])
-        far = np.abs(x[known.p] - y) - self._near[known.e] - self.height
-        near = far < 0.0
-        beyond = np.min(far[~near] + self.height, initial=beyond)
-        p, e, f = known.p[near], known.e[near], self.surfaces.facets
-        if not len(p):
-            return Touching(p, e, np.zeros(0), np.zeros(0), beyond)
-        zeta, there = self.surfaces.project(x[p], e, known.zeta[near], z)
-        zeta = np.where(there, zeta, np.clip(zeta, -1.0, 1.0))
-        c, T = (self.surfaces.along(e, zeta, order, z) for order in (0, 1))
-        normal = f.sides[e] * 1j * T / np.abs(T)
-        gap = dot(normal, x[p] - c) - f.offsets[e]
-        gap[~there] = np.abs(x[p] - c)[~there] - f.offsets[e[~there]]
-        begins = np.broadcast_to(self.begins, x.shape)[p]
-        apart = ~self._together(p, e, zeta, 0.0 * f.lengths)
-        left = np.where(gap < begins, -DEEPEST * self.height - gap, gap - begins)
-        beyond = np.min(left[apart], initial=beyond)
-        fits = there & apart & (gap < begins) & (gap > -DEEPEST * self.height) & (
-            dot(normal, n[p]) < OPPOSED)
-        p, e, zeta, gap = p[fits], e[fits], zeta[fits], gap[fits]
-        away = np.abs(gap) + np.maximum(np.abs(zeta) - 1.0, 0.0) * f.lengths[e]
-        order = np.lexsort((away, p))
-        best = order[np.append(True, np.diff(p[order]) != 0)[:len(p)]]
-        return Touching(p[best], e[best], zeta[best], gap[best], beyond)
-
-    def place(self, e: Array, zeta: Array) -> Array:
-        """Where points of facets are along their curve."""
-        f = self.surfaces.facets
-        return f.places[e] + 0.5 * (1.0 + zeta) * f.lengths[e]
+        return Candidates(*(_packed(x, y) for x, y in (
+            (p, np.int64), (e[k], np.int64), (zeta[k], float))))
 
     # parts that are one body
-
-    def _together(self, p, e, zeta, less):
-        """True for points and facets of one beam, or of joined ones, near to each other."""
-        # Closer by ``less`` (F,).
-        f = self.surfaces.facets
-        own, a = f.of[p], self._along(f.of[p], f.zeta[p])
-        b, apart = self._along(e, zeta), APART * f.heights[e] - less[e]
-        out = (f.members[own] == f.members[e]) & (f.chains[own] == f.chains[e]) & (
-            np.abs(a - b) < apart)
-        for i, s, j, r in self.joined:
-            out |= (f.chains[own] == i) & (f.chains[e] == j) & (np.abs(a - s) < apart) & (
-                np.abs(b - r) < apart)
-        return out
 
     def _along(self, e, zeta):
         """Where points of facets are along the axis."""
@@ -277,6 +258,10 @@ class Search:
                     n = int(np.argmax(hit))
                     return a[p[n]] + t[n] * (b - a)[p[n]]
         return None
+
+
+def _packed(x, kind):
+    return np.ascontiguousarray(x, dtype=kind)
 
 
 def crossing(a: Array, b: Array) -> Array:

@@ -1,0 +1,632 @@
+"""Kernels of contact of members: what points face, gaps, pressures, friction.
+
+A point of a surface is ``x = r + i s t / |t|``, with the place r and the slope t of its own facet
+and its signed offset s. Its gap from the facet with the curve c and the slope T is
+
+    g = side Im(conj(T) (x - c)) / |T| - offset
+
+where c is the closest point: ``Re(conj(T) (x - c)) = 0``. All of r, t, c, T are linear in the
+degrees of freedom. Plane vectors v are complex numbers; a derivative by v is the number d with the
+change ``Re(conj(d) dv)``.
+"""
+
+from typing import Annotated, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ...core import (C1, C2, C3, F1, F2, I1, I2, MADE, apart, everywhere, indices, primitive,
+                     source, where)
+from ...core.band import copy, dot as inner, largest, smallest
+from ...core.callbacks import SEARCHES, call_custom, owner
+from ..tables import add_each, least_each
+from .laws import mean_pressure, mean_pressure_slope, return_mapping
+
+#: Iterations of the projection, its largest step along a facet, and how far it may leave it.
+PROJECT, FAR, LEFT = 12, 1.0, 1.5
+#: A point is on a facet if its projection leaves it by less, so that round-off does not decide
+#: about points on edges, as of equal rods that collide.
+EDGE = 0.02
+#: No contact of a beam with itself, or with a beam that it is joined to, within so many heights.
+APART = 3.0
+#: Largest penetration, in heights; a point as deep as the height lies on the other face.
+DEEPEST = 0.75
+#: Largest cosine of the angle between outer normals of surfaces that touch.
+OPPOSED = -0.2
+#: And the cosine at another place of a facet, from which on it faces the same way everywhere.
+SAME = 0.8
+#: Iterations for the place of a mean force; change of a gap in heights below which none is needed.
+MEANS, CLOSE = 8, 1e-9
+#: The gap where nothing is.
+NOTHING = 1e300
+#: Vectors r, t, c, T of a contact point, and their components.
+VECTORS, COMPONENTS = 4, 8
+
+
+class Candidates(NamedTuple):
+    """Points and facets that may touch, with a guess of the place on the facet, (n,)."""
+
+    p: I1
+    e: I1
+    zeta: F1
+
+
+class Facing(NamedTuple):
+    """What points of surfaces face at a state: facet or -1, closest point and gap, (P,)."""
+
+    curve: C2  # coefficients of facets, (k, F)
+    x: C1
+    normal: C1
+    e: I1
+    zeta: F1
+    gap: F1
+    clear: F1  # the least gap of all, negative if any touches, (1,)
+
+
+class PairTables(NamedTuple):
+    """The surfaces of members that may touch, see :class:`~skfem_ancf.actions.pairs.facets.Facets`.
+
+    F facets and P points with B pairs of degrees of freedom each, among the ``n`` that are used.
+    """
+
+    used: I1  # pairs of degrees of freedom of the scene, (n,)
+    dofs: I2  # (B, F)
+    weights: C3  # coefficients of powers of zeta, (B, k, F)
+    starts: C2  # (k, F)
+    sides: F1
+    offsets: F1
+    places: F1
+    lengths: F1
+    spans: F1
+    heights: F1
+    firmness: F1
+    near: F1  # distance of a point of a facet from the guess for it
+    members: I1
+    chains: I1
+    curves: I1
+    joined: F2  # chain and place on it, of two parts that are joined, (j, 4)
+    of: I1  # facets of points
+    zeta: F1
+    areas: F1
+    begins: F1  # gaps at which the pressure begins
+    point_dofs: I2  # (B, P)
+    N: C2  # weights of places, (B, P)
+    D: C2  # and of slopes
+    height: float
+    width: float  # of the transition from no pressure to proportional pressure
+    friction: float
+    handle: int  # of the search
+    found: I1  # address of the Candidates
+    seen: C1  # displacements at the last search, (n,)
+    moves: F1  # how far a point moves for each, at most
+    skin: F1  # the candidates are complete until points or facets have moved by half of it, (1,)
+    start: Facing  # at the start of the last step, with the displacements there
+    start_at: C1
+    history: F1  # factor on the stiffness, less 1; with friction curves and anchors of points
+
+
+class Meeting(NamedTuple):
+    """Pairs in contact at one of two states, with penetrations at both, (n,)."""
+
+    at: I1
+    e: I1
+    zeta: F1
+    before: F1
+    after: F1
+    share: F1  # correction of the mean pressure
+
+
+PAIRS: TypeAlias = PairTables
+FACING: TypeAlias = Annotated[Facing, MADE]
+
+
+@primitive("skfem_ancf.equations.loops")
+def pair_tables(tables, k):
+    """The PairTables number k of :class:`~skfem_ancf.actions.forces.kernels.ForceTables`."""
+    return tables.pairs[k]
+
+
+@primitive("skfem_ancf.equations.loops")
+def candidates_of(t):
+    """The :class:`Candidates` of the last search."""
+    return owner(t.handle).candidates
+
+
+# plane vectors and curves
+
+
+@source
+def dot(a, b):
+    """The scalar product."""
+    return a.real * b.real + a.imag * b.imag
+
+
+@source
+def cross(a, b):
+    """The product ``a_1 b_2 - a_2 b_1``."""
+    return a.real * b.imag - a.imag * b.real
+
+
+@source
+def size(a):
+    """The length."""
+    return np.sqrt(a.real * a.real + a.imag * a.imag)
+
+
+@source
+def scaled(c, a):
+    """A multiple; Numba would multiply and divide by a complex number."""
+    return vector(c * a.real, c * a.imag)
+
+
+@source
+def turned(a):
+    """A vector turned by a right angle, ``1j a``."""
+    return vector(-a.imag, a.real)
+
+
+@primitive("skfem_ancf.core.loops")
+def vector(x, y):
+    """The vector with two components; Numba would multiply by 1j."""
+    return x + 1j * y
+
+
+@source
+def along(curve, e, zeta):
+    """Polynomials number e at zeta, with their first two derivatives."""
+    last = curve.shape[0] - 1
+    x, y, X, Y = curve[last, e].real, curve[last, e].imag, 0.0 * zeta, 0.0 * zeta
+    A, B = X, Y
+    for k in range(last - 1, -1, -1):
+        A, B = A * zeta + 2.0 * X, B * zeta + 2.0 * Y
+        X, Y = X * zeta + x, Y * zeta + y
+        x, y = x * zeta + curve[k, e].real, y * zeta + curve[k, e].imag
+    return vector(x, y), vector(X, Y), vector(A, B)
+
+
+@source
+def clipped(x, low, high):
+    return np.minimum(np.maximum(x, low), high)
+
+
+@source
+def project(curve, e, zeta, x):
+    """The closest point of facets e to x, from a guess: zeta, and True if it is there."""
+    step = 0.0 * zeta
+    for _ in range(PROJECT):
+        c, T, A = along(curve, e, zeta)
+        d, square = x - c, dot(T, T)
+        bend = square - dot(A, d)
+        bend = where(bend > 0.1 * square, bend, square)
+        step = clipped(dot(T, d) / bend, -FAR, FAR)
+        new = clipped(zeta + step, -LEFT, LEFT)
+        still, zeta = np.abs(new - zeta), new
+        if everywhere(still < 1e-14):
+            break
+    return zeta, (np.abs(step) < 1e-9) & (np.abs(zeta) <= 1.0 + EDGE)
+
+
+# what points face
+
+
+@apart("pairs", PAIRS, C1, FACING)
+def look(t, z, found):
+    """Find what all points face at displacements z."""
+    curve, x, normal = found.curve, found.x, found.normal
+    B, n, F = t.weights.shape
+    for k in range(n):
+        for e in indices(F):
+            curve[k, e] = t.starts[k, e]
+        for b in range(B):
+            for e in indices(F):
+                curve[k, e] += t.weights[b, k, e] * z[t.dofs[b, e]]
+    for p in indices(x.size):
+        r, T, _ = along(curve, t.of[p], t.zeta[p])
+        side = t.sides[t.of[p]]
+        outer = scaled(side / size(T), turned(T))
+        normal[p], x[p] = outer, r + scaled(t.offsets[t.of[p]], outer)
+        found.e[p], found.zeta[p], found.gap[p] = -1, 0.0, 0.0
+    moved = np.empty(z.size)
+    for k in indices(z.size):
+        moved[k] = t.moves[k] * size(z[k] - t.seen[k])
+    way = largest(moved)
+    if not way < 0.5 * t.skin[0]:
+        none = t.moves[:0]
+        call_custom(SEARCHES, t.handle, np.int64(0), 0.0, 0.0, z.view(np.float64), none, none)
+        way = 0.0
+    known = candidates_of(t)
+    far = np.empty(known.p.size)
+    for i in indices(far.size):
+        p, e = known.p[i], known.e[i]
+        c, T, _ = along(curve, e, known.zeta[i])
+        far[i] = size(x[p] - c) - t.near[e]
+        # the other face of a member, which faces the same way, is never touched
+        same = t.sides[e] * cross(T, normal[p]) > SAME * size(T)
+        far[i] = where(same, 0.25 * NOTHING, far[i])
+    found.clear[0] = t.skin[0] + t.height - 2.0 * way
+    for i in indices(far.size):
+        far[i] = where(far[i] < t.height, NOTHING, far[i])
+    found.clear[0] = min(found.clear[0], smallest(far) if far.size > 0 else NOTHING)
+    near = np.nonzero(far > 0.5 * NOTHING)[0]
+    if near.size > 0:
+        _face(t, known, near, found)
+
+
+@source
+def _face(t, known, near, found):
+    """Find the nearest facet of each point of some candidates that it may touch."""
+    curve, n, P = found.curve, near.size, found.x.size
+    zeta, gap, away, beyond = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    of, facets, order = np.empty(n, np.int64), np.empty(n, np.int64), np.arange(n)
+    for i in indices(n):
+        p, e = known.p[near[i]], known.e[near[i]]
+        x = found.x[p]
+        s, there = project(curve, e, known.zeta[near[i]], x)
+        s = where(there, s, clipped(s, -1.0, 1.0))
+        c, T, _ = along(curve, e, s)
+        outer, d, begins = scaled(t.sides[e] / size(T), turned(T)), x - c, t.begins[p]
+        g, joined = where(there, dot(outer, d), size(d)) - t.offsets[e], together(t, p, e, s, 0.0)
+        left = where(g < begins, -DEEPEST * t.height - g, g - begins)
+        beyond[i] = where(joined, NOTHING, left)
+        fits = there & (g < begins) & (g > -DEEPEST * t.height) & (
+            dot(outer, found.normal[p]) < OPPOSED)
+        away[i] = where(fits, np.abs(g) + np.maximum(np.abs(s) - 1.0, 0.0) * t.lengths[e], NOTHING)
+        away[i] = where(joined, NOTHING, away[i])
+        zeta[i], gap[i], of[i], facets[i] = s, g, p, e
+    found.clear[0] = min(found.clear[0], smallest(beyond))
+    least, first = np.full(P, 0.5 * NOTHING), np.full(P, n)
+    least_each(least, of, away)
+    for i in indices(n):
+        order[i] += n * (away[i] > least[of[i]])
+    least_each(first, of, order)
+    hit = np.nonzero(first < n)[0]
+    for p in indices(hit.size):
+        i = first[hit[p]]
+        found.e[hit[p]], found.zeta[hit[p]], found.gap[hit[p]] = facets[i], zeta[i], gap[i]
+
+
+@source
+def place(t, e, zeta):
+    """Where points of facets are along their curve."""
+    return t.places[e] + 0.5 * (1.0 + zeta) * t.lengths[e]
+
+
+@source
+def together(t, p, e, zeta, less):
+    """True for points and facets of one beam, or of joined ones, near to each other; closer by
+    ``less`` lengths of the facet."""
+    own = t.of[p]
+    a = t.places[own] + 0.5 * (1.0 + t.zeta[p]) * t.spans[own]
+    b, apart = t.places[e] + 0.5 * (1.0 + zeta) * t.spans[e], (
+        APART * t.heights[e] - less * t.lengths[e])
+    out = (t.members[own] == t.members[e]) & (t.chains[own] == t.chains[e]) & (
+        np.abs(a - b) < apart)
+    for k in range(t.joined.shape[0]):
+        i, s, j, r = t.joined[k, 0], t.joined[k, 1], t.joined[k, 2], t.joined[k, 3]
+        out = out | ((t.chains[own] == i) & (t.chains[e] == j) & (np.abs(a - s) < apart) & (
+            np.abs(b - r) < apart))
+    return out
+
+
+@source
+def facing(n, F, P):
+    """A :class:`Facing` of P points and F facets with n coefficients."""
+    return Facing(np.empty((n, F), np.complex128), np.empty(P, np.complex128),
+                  np.empty(P, np.complex128), np.empty(P, np.int64), np.empty(P), np.empty(P),
+                  np.empty(1))
+
+
+@source
+def faced(t, z):
+    """The :class:`Facing` at displacements z."""
+    found = facing(t.starts.shape[0], t.starts.shape[1], t.of.size)
+    look(t, z, found)
+    return found
+
+
+# pairs at the two ends of a step
+
+
+@source
+def gap_to(t, curve, e, zeta, x):
+    """The gap of x from facets e at zeta."""
+    c, T, _ = along(curve, e, zeta)
+    return t.sides[e] * cross(T, x - c) / size(T) - t.offsets[e]
+
+
+@source
+def meet(t, same, f0, f1):
+    """The :class:`Meeting` between two states, or at one."""
+    P = f1.e.size
+    facets = np.empty(P, np.int64)
+    for p in indices(P):
+        facets[p] = where(f1.e[p] < 0, f0.e[p], f1.e[p])
+    at = np.nonzero(facets >= 0)[0]
+    n, of = at.size, facets[at]
+    zeta, before, after, share = np.empty(n), np.empty(n), np.empty(n), np.ones(n)
+    for i in indices(n):
+        p, e = at[i], of[i]
+        begins = t.begins[p]
+        if same:
+            zeta[i], before[i], after[i] = f1.zeta[p], begins - f1.gap[p], begins - f1.gap[p]
+        else:
+            here, there = f1.e[p] == e, f0.e[p] == e
+            guess = where(here, f1.zeta[p], f0.zeta[p])
+            s0, g0 = _other(t, f0, p, e, guess, there)
+            s1, g1 = _other(t, f1, p, e, guess, here)
+            before[i], after[i] = begins - g0, begins - g1
+            zeta[i], share[i] = _mean_place(t, f0, f1, p, e, s0, s1, g1 - g0)
+    return Meeting(at, of, zeta, before, after, share)
+
+
+@source
+def _other(t, found, p, e, guess, known):
+    """Place and gap of pairs at a state, of known ones and others; no penetration of those that
+    are apart."""
+    s, there = project(found.curve, e, guess, found.x[p])
+    s = where(there, s, guess)
+    gap = np.maximum(gap_to(t, found.curve, e, s, found.x[p]), t.begins[p])
+    return where(known, found.zeta[p], s), where(found.e[p] >= 0, found.gap[p], gap)
+
+
+@source
+def _mean_place(t, f0, f1, p, e, s0, s1, wanted):
+    """Where between two places the gap changes as ``wanted``, and what that is over the change.
+
+    The gap is least at the closest point, so there is one.
+    """
+    low, high = np.minimum(s0, s1), np.maximum(s0, s1)
+    x, y = f0.x[p], f1.x[p]
+    below = gap_to(t, f1.curve, e, low, y) - gap_to(t, f0.curve, e, low, x) - wanted
+    above = gap_to(t, f1.curve, e, high, y) - gap_to(t, f0.curve, e, high, x) - wanted
+    zeta, left, going = low, below, np.abs(wanted) >= 0.0
+    for _ in range(MEANS):
+        slope = above - below
+        share = where(slope == 0.0, 0.5, -below / where(slope == 0.0, 1.0, slope))
+        zeta = where(going, low + clipped(share, 0.0, 1.0) * (high - low), zeta)
+        left = gap_to(t, f1.curve, e, zeta, y) - gap_to(t, f0.curve, e, zeta, x) - wanted
+        going = going & (np.abs(left) > 1e-3 * np.abs(wanted) + 1e-15 * t.height)
+        if everywhere(np.logical_not(going)):
+            break
+        up = left * below > 0.0
+        low, below = where(going & up, zeta, low), where(going & up, left, below)
+        high, above = where(up, high, where(going, zeta, high)), where(
+            up, above, where(going, left, above))
+    change = left + wanted
+    good = (np.abs(wanted) > CLOSE * t.height) & (np.abs(change) > 0.3 * np.abs(wanted))
+    return zeta, where(good, wanted, 1.0) / where(good, change, 1.0)
+
+
+@source
+def stiffness_of(t, p, e):
+    """Stiffness times area of pairs."""
+    return 0.5 * (1.0 + t.history[0]) * np.minimum(t.firmness[t.of[p]], t.firmness[e]) * t.areas[p]
+
+
+@source
+def rubbing(t, end, p, e, k, limit):
+    """Friction of pairs at the end of a step: force along the facet, 1 for sticking, and the rate
+    of the slip by the place along the facet. Those that have parted have none."""
+    zeta, n = end.zeta[p], t.of.size
+    _, T, A = along(end.curve, e, zeta)
+    length = size(T)
+    depth = (end.gap[p] + t.offsets[e]) * t.sides[e] * cross(T, A) / length
+    rate = (length - depth / length) * 2.0 / t.lengths[e]
+    held = (end.e[p] >= 0) & (t.history[1 + p] == t.curves[e] + 1.0)
+    slip = where(held, rate * (place(t, e, zeta) - t.history[1 + n + p]), 0.0)
+    force, sticks = return_mapping(k * slip, limit)
+    return force, where(held, sticks, 0.0), rate
+
+
+# derivatives of the gap and of the place along the facet by r, t, c and T
+
+
+@source
+def mean_slope(a, b, side, s):
+    """Mean derivative of the gap between two states, r, t, c and T each: its product with their
+    change is the change of the gap.
+
+    The gap is a function of the products of r - c, t and T, which do not change with rigid motions:
+    differences of products are exact with means of the factors, so a force along the mean
+    derivative keeps both momenta. For equal states it is the derivative.
+    """
+    rho0, rho1 = a[0] - a[2], b[0] - b[2]
+    rho, t, T = scaled(0.5, rho0 + rho1), scaled(0.5, a[1] + b[1]), scaled(0.5, a[3] + b[3])
+    m0, m1, M0, M1 = 1.0 / size(a[1]), 1.0 / size(b[1]), 1.0 / size(a[3]), 1.0 / size(b[3])
+    b0, b1 = dot(a[3], a[1]), dot(b[3], b[1])
+    m, M, both = 0.5 * (m0 + m1), 0.5 * side * (M0 + M1), 0.5 * (b0 + b1)
+    depth = 0.5 * (cross(a[3], rho0) + s * b0 * m0 + cross(b[3], rho1) + s * b1 * m1)
+    of_t, of_T = -2.0 * (m0 * m1) ** 2 / (m0 + m1), -2.0 * (M0 * M1) ** 2 / (M0 + M1)
+    by_r = scaled(M, turned(T))
+    return (by_r, scaled(M * s * m, T) + scaled(M * s * both * of_t, t), -by_r,
+            scaled(M * s * m, t) - scaled(M, turned(rho)) + scaled(side * depth * of_T, T))
+
+
+@source
+def slip_row(v, s):
+    """Derivative of the place of the point along the facet, ``conj(T) (x - c) / |T|``."""
+    short, length = 1.0 / size(v[1]), 1.0 / size(v[3])
+    across, way = turned(scaled(short, v[1])), scaled(length, v[3])
+    return way, scaled(s * short * cross(across, way), across), -way, scaled(
+        length, v[0] + scaled(s, across) - v[2])
+
+
+@source
+def vectors(t, found, p, e, zeta):
+    """r, t, c and T of pairs at a state."""
+    r, d, _ = along(found.curve, t.of[p], t.zeta[p])
+    c, T, _ = along(found.curve, e, zeta)
+    return r, d, c, T
+
+
+@source
+def middle(a, b):
+    """The mean of r, t, c and T at two states."""
+    return (scaled(0.5, a[0] + b[0]), scaled(0.5, a[1] + b[1]), scaled(0.5, a[2] + b[2]),
+            scaled(0.5, a[3] + b[3]))
+
+
+# forces
+
+
+@source
+def both_faced(t, z0, z1, same):
+    """The :class:`Facing` at two states, or at one."""
+    end = faced(t, z1)
+    if same:
+        return end, end
+    start, away = Facing(t.start.curve, t.start.x, t.start.normal, t.start.e, t.start.zeta,
+                         t.start.gap, t.start.clear), np.empty(z0.size)
+    for k in indices(away.size):
+        away[k] = size(z0[k] - t.start_at[k])
+    if not largest(away) <= 0.0:  # all iterations of a step begin there
+        look(t, z0, start)
+        copy(z0, t.start_at)
+    return start, end
+
+
+@apart("pairs", PAIRS, C1, C1, bool, C1, F1)
+def pair_force(t, z0, z1, same, out, clear):
+    """Add the mean force between two states, or that at one; ``clear`` (1,) gets the least gap."""
+    f0, f1 = both_faced(t, z0, z1, same)
+    clear[0] = f1.clear[0]
+    met = meet(t, same, f0, f1)
+    if met.at.size > 0:
+        R = np.empty((VECTORS, met.at.size), np.complex128)
+        forces(t, f0, f1, met, R)
+        _spread(t, met, R, out)
+
+
+@source
+def forces(t, f0, f1, met, R):
+    """Set the resisting forces of pairs on r, t, c and T."""
+    for i in indices(met.at.size):
+        p, e = met.at[i], met.e[i]
+        s = t.sides[t.of[p]] * t.offsets[t.of[p]]
+        a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
+        k = stiffness_of(t, p, e)
+        pressure = k * mean_pressure(met.before[i], met.after[i], t.width) * met.share[i]
+        g = mean_slope(a, b, t.sides[e], s)
+        R[0, i], R[1, i] = scaled(-pressure, g[0]), scaled(-pressure, g[1])
+        R[2, i], R[3, i] = scaled(-pressure, g[2]), scaled(-pressure, g[3])
+        if t.friction > 0.0:
+            force, _, _ = rubbing(t, f1, p, e, k, t.friction * pressure)
+            w = slip_row(middle(a, b), s)
+            R[0, i] += scaled(force, w[0])
+            R[1, i] += scaled(force, w[1])
+            R[2, i] += scaled(force, w[2])
+            R[3, i] += scaled(force, w[3])
+
+
+@source
+def _spread(t, met, R, out):
+    """Add forces on r, t, c and T to those on degrees of freedom."""
+    value = np.empty(met.at.size, np.complex128)
+    for b in range(t.N.shape[0]):
+        N, D, rows = t.N[b], t.D[b], t.point_dofs[b]
+        for i in indices(value.size):
+            p = met.at[i]
+            value[i] = np.conj(N[p]) * R[0, i] + np.conj(D[p]) * R[1, i]
+        add_each(out, rows[met.at], value)
+        weights, rows = t.weights[b], t.dofs[b]
+        for i in indices(value.size):
+            c, T, _ = along(weights, met.e[i], met.zeta[i])
+            value[i] = np.conj(c) * R[2, i] + np.conj(T) * R[3, i]
+        add_each(out, rows[met.e], value)
+
+
+@source
+def potential(t, found):
+    """The energy of the pressure."""
+    at = np.nonzero(found.e >= 0)[0]
+    k, S = np.empty(at.size), np.empty(at.size)
+    for i in indices(at.size):
+        p = at[i]
+        a = t.begins[p] - found.gap[p]
+        k[i] = stiffness_of(t, p, found.e[p])
+        S[i] = (np.maximum(a, 0.0) ** 3 - np.maximum(a - t.width, 0.0) ** 3) / (6.0 * t.width)
+    return inner(k, S)
+
+
+@apart("pairs", PAIRS, C1, C1, F1, returns=float)
+def pair_accept(t, z0, z1, after):
+    """Set the history at the end of a step between two states, and return what it dissipates."""
+    f0, f1 = both_faced(t, z0, z1, False)
+    met, force, n = meet(t, False, f0, f1), np.zeros(z0.size, np.complex128), t.of.size
+    way, R = np.empty(z0.size, np.complex128), np.empty((VECTORS, met.at.size), np.complex128)
+    if met.at.size > 0:
+        forces(t, f0, f1, met, R)
+        _spread(t, met, R, force)
+    for k in indices(way.size):
+        way[k] = z1[k] - z0[k]
+    at = np.nonzero(f1.e >= 0)[0]
+    curves, anchors = np.zeros(n), np.zeros(n)
+    for i in indices(at.size):
+        p, e = at[i], f1.e[at[i]]
+        k, a = stiffness_of(t, p, e), t.begins[p] - f1.gap[p]
+        rub, _, rate = rubbing(t, f1, p, e, k, t.friction * k * mean_pressure(a, a, t.width))
+        curves[p], anchors[p] = t.curves[e] + 1.0, place(t, e, f1.zeta[p]) - rub / k / rate
+    copy(curves, after[1:1 + n])
+    copy(anchors, after[1 + n:])
+    work = inner(force.view(np.float64), way.view(np.float64))
+    return work + potential(t, f0) - potential(t, f1)
+
+
+@apart("pairs", PAIRS, C1, C1, bool, I1, F1, F2, returns=int)
+def pair_stiffness(t, z0, z1, same, facets, zeta, K):
+    """Derivative of the resisting force of n pairs by r, t, c and T, twice that of the mean force.
+
+    ``facets`` (P,) get those of points in contact, else -1, ``zeta`` (P,) the places on them, K the
+    derivatives, (64, n), for P columns.
+    """
+    f0, f1 = both_faced(t, z0, z1, same)
+    met = meet(t, same, f0, f1)
+    n, friction, twice = met.at.size, t.friction, 1.0 if same else 2.0
+    for p in indices(facets.size):
+        facets[p] = -1
+    G, S, turns = np.empty((COMPONENTS, n)), np.empty((COMPONENTS, n)), np.zeros((COMPONENTS, n))
+    M, unit, across = np.empty((COMPONENTS, n)), np.zeros((COMPONENTS, n)), np.zeros(
+        (COMPONENTS, n))
+    for i in indices(n):
+        p, e = met.at[i], met.e[i]
+        facets[p], zeta[p] = e, met.zeta[i]
+        s, side, k = t.sides[t.of[p]] * t.offsets[t.of[p]], t.sides[e], stiffness_of(t, p, e)
+        a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
+        v = middle(a, b)
+        mean = mean_pressure(met.before[i], met.after[i], t.width)
+        slope = k * mean_pressure_slope(met.before[i], met.after[i], t.width, mean)
+        _put(G, i, mean_slope(a, b, side, s))
+        row = slip_row(v, s)
+        _put(S, i, row)
+        # curvature of the gap: of the facet, of its turns and of the point along it
+        bend = 0.5 * (along(f0.curve, e, met.zeta[i])[2] + along(f1.curve, e, met.zeta[i])[2])
+        length, short = size(v[3]), size(v[1])
+        outer, d = side * 1j * v[3] / length, v[1] / short
+        depth, curl, square = dot(outer, v[0] + 1j * s * d - v[2]), dot(outer, bend), length**2
+        share = length / (square - depth * curl)
+        turns[6, i], turns[7, i] = outer.real, outer.imag
+        _put(M, i, (share * row[0], share * row[1], share * row[2], share * row[3]))
+        unit[2, i], unit[3, i] = d.real / short, d.imag / short
+        across[2, i], across[3, i] = -unit[3, i], unit[2, i]
+        force, sticks = 0.0, 0.0
+        if friction > 0.0:
+            force, sticks, _ = rubbing(t, f1, p, e, k, friction * k * mean * met.share[i])
+        change = friction * np.sign(force) * (1.0 - sticks) * slope
+        both, bent, p = s * dot(outer, d), s * dot(outer, 1j * d), k * mean
+        for x in range(COMPONENTS):
+            w = depth / square * (turns[x, i] + curl * M[x, i])
+            by_g, by_s = slope * G[x, i] - change * S[x, i], twice * sticks * k * S[x, i]
+            by_turn, by_m = p * (M[x, i] - w), p * (curl * (M[x, i] - w) + turns[x, i])
+            by_unit, by_across = -p * both * across[x, i], p * (
+                bent * across[x, i] - both * unit[x, i])
+            for y in range(COMPONENTS):
+                K[COMPONENTS * x + y, i] = (
+                    by_g * G[y, i] + by_s * S[y, i] + by_turn * turns[y, i] + by_m * M[y, i]
+                    + by_unit * unit[y, i] + by_across * across[y, i])
+    return n
+
+
+@source
+def _put(rows, i, v):
+    """Set components of r, t, c and T."""
+    rows[0, i], rows[1, i], rows[2, i], rows[3, i] = v[0].real, v[0].imag, v[1].real, v[1].imag
+    rows[4, i], rows[5, i], rows[6, i], rows[7, i] = v[2].real, v[2].imag, v[3].real, v[3].imag
