@@ -287,8 +287,10 @@ class _Step:
         (system, c), y = self._same(scene.system), self.y
         J, M, static = c.sparse_jacobian(y.u, y.t), system.mass.multiply, self._design.state
         instant = INSTANT * self._h
-        rate, bend = (f(instant, system, y.u, y.v, x, y.t)
-                      for f, x in ((_rate, y.v), (_bend, y.acceleration)))
+        rate = _rate(instant, system, y.u, y.v, y.t)
+        late, early = (_rate(instant, system, y.u + step * y.v, y.v, y.t + step)
+                       for step in (instant, -instant))
+        bend = J @ y.acceleration + (late - early) / (2.0 * instant)  # the second rate
         if self._raw is not None:
             v, a = self._raw
             # forces of damping are those of the velocity of the scheme, before the joints
@@ -413,7 +415,7 @@ class _MeanStep(_Step):
         first[c.fixed] = c.values(y.t)
         return np.concatenate([
             first, c.constraint(y.u, y.t), M(y.v - self._velocity) + J.T @ self._impulse,
-            _rate(INSTANT * self._h, system, y.u, y.v, y.v, y.t)])
+            _rate(INSTANT * self._h, system, y.u, y.v, y.t)])
 
     def magnitudes(self) -> Array:
         found = super().magnitudes()
@@ -562,15 +564,8 @@ def _residual(t, system, u, a, l, v):
     return np.concatenate([rest, c.constraint(u, t)])
 
 
-def _rate(instant, system, u, _, v, t):
+def _rate(instant, system, u, v, t):
     """The rate of the joints for a velocity v."""
     c = system.constraints
     late, early = (c.constraint(u, t + step) for step in (instant, -instant))
     return c.sparse_jacobian(u, t) @ v + (late - early) / (2.0 * instant)
-
-
-def _bend(instant, system, u, v, a, t):
-    """The second rate of the joints for an acceleration a."""
-    late, early = (_rate(instant, system, u + step * v, v, v, t + step)
-                   for step in (instant, -instant))
-    return system.constraints.sparse_jacobian(u, t) @ a + (late - early) / (2.0 * instant)

@@ -150,7 +150,13 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
         while len(points) <= steps:
             start, straight = points[-1], branch is None or len(points) > 1
             try:
-                point, bend = _step(tracer, start, step)
+                point = tracer.set_tangent(tracer.advance(start, step), start)
+                # the deviation from a straight line
+                mean = 0.5 * step * (start.tangent + point.tangent)
+                bend = tracer.norm(point.u - start.u - mean) / step
+                if (scale := max(abs(start.load), abs(point.load))) > 0:
+                    gap = point.load - start.load - 0.5 * step * (start.rate + point.rate)
+                    bend = max(bend, abs(gap) / scale)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
                     raise LoadStepFailed("the path turns")
                 last = abs(point.load) >= limit
@@ -339,18 +345,6 @@ def _history_at(point, start):
     """The history at a point after another one."""
     system = start.system.after(start.history)
     return system.accept(start.u, point.u, point.load, point.load)[0]
-
-
-def _step(tracer, start, ds):
-    """The next point with its tangent, and the deviation from a straight line."""
-    point = tracer.set_tangent(tracer.advance(start, ds), start)
-    mean = 0.5 * ds * (start.tangent + point.tangent)
-    bend = tracer.norm(point.u - start.u - mean) / ds
-    scale = max(abs(start.load), abs(point.load))
-    if scale > 0:
-        gap = point.load - start.load - 0.5 * ds * (start.rate + point.rate)
-        bend = max(bend, abs(gap) / scale)
-    return point, bend
 
 
 def _land(tracer, start, point, load):

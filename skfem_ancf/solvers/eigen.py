@@ -254,7 +254,13 @@ def buckling(system: System, k: int, state: State | None = None) -> Buckling:
     tangent, loads, du, stress, multipliers = _linear_response(system, state)
     n, m = tangent.size
     k = _count(k, n - m)
-    Ks = loads.geometric(stress, multipliers, 1.0) + _geometric_of_domains(system, tangent, du)
+    Ks = loads.geometric(stress, multipliers, 1.0)
+    for domain in system.domains:  # the derivative of its tangent along the response
+        s, (i, j) = system.of(domain), domain.pattern
+        h = SMALL * domain.size / max(np.max(np.abs(du[s])), np.finfo(float).tiny)
+        change = (domain.stiffness(h * du[s]) - domain.stiffness(-h * du[s])) / (2.0 * h)
+        K = sparse.csr_matrix((change, (s.start + i, s.start + j)), shape=(system.N, system.N))
+        Ks = Ks + K[tangent.free][:, tangent.free]
     if not Ks.nnz or not abs(Ks).max() > 0.0:
         raise InputError("no positive load factor: the loads do not stress the beam")
     symmetric = is_symmetric(Ks, system.constraints.coordinate_sizes[tangent.free])
@@ -296,18 +302,6 @@ def _linear_response(system, state):
                             state.multipliers)
     loads = StrainTangent(system, state.u, 0.0, None, state.multipliers)
     return tangent, loads, *tangent.added(system.external_force(state.u))
-
-
-def _geometric_of_domains(system, tangent, du):
-    """Derivative of domain tangents along a displacement (N,), between free DOFs."""
-    K = sparse.csr_matrix((system.N, system.N))
-    for domain in system.domains:
-        s = system.of(domain)
-        h = SMALL * domain.size / max(np.max(np.abs(du[s])), np.finfo(float).tiny)
-        i, j = domain.pattern
-        change = (domain.stiffness(h * du[s]) - domain.stiffness(-h * du[s])) / (2.0 * h)
-        K = K + sparse.csr_matrix((change, (s.start + i, s.start + j)), shape=K.shape)
-    return K[tangent.free][:, tangent.free]
 
 
 def _prestressed(system):

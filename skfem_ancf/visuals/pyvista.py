@@ -161,13 +161,6 @@ def _fill(block, grid, body, facts):
     return block
 
 
-def has_display() -> bool:
-    """True in a notebook, and if windows can be opened."""
-    if "ipykernel" in sys.modules or sys.platform in ("win32", "darwin"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
 def view(state: Any, field: Any = None, plotter: Any = None, *,
          thickness: Any = "auto", undeformed: bool = True, cmap: Any = None, limits: Any = None,
          unit: str | None = None,
@@ -260,7 +253,8 @@ def _new_plotter(off_screen, window_size):
     """A plotter, with a window if there is a display."""
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    hidden = not has_display()
+    hidden = not ("ipykernel" in sys.modules or sys.platform in ("win32", "darwin")
+                  or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
     off_screen = hidden if off_screen is None else require_flag("off_screen", off_screen)
     size, said = pixels("window_size", window_size), vtkLogger.GetCurrentVerbosityCutoff()
     if hidden and off_screen:  # VTK warns of a missing display

@@ -156,13 +156,6 @@ def _limits(limits, values, field):
     return (start - size if field.signed else start), start + size
 
 
-def _default(states):
-    """The stress along the beams; the displacement where there is no stress."""
-    stressed = any(beam.section.has_fields and np.any(state.u_of(beam))
-                   for state in states for beam in state.beams)
-    return "S_xx" if stressed else "displacement"
-
-
 class Scenery:
     """States of the same beams with one thickness factor and one range of colours. Arguments are
     those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and ``rigid`` are for
@@ -175,7 +168,10 @@ class Scenery:
     def __init__(self, states: list[Any], field: Any, thickness: Any, undeformed: bool,
                  limits: Any, subdivide: tuple[int, int], recover: bool,
                  scale: Any = 1.0) -> None:
-        self.field: Field = find_field(_default(states) if field is None else field, DRAWN)
+        if field is None:  # the displacement where there is no stress
+            field = "S_xx" if any(beam.section.has_fields and np.any(state.u_of(beam))
+                                  for state in states for beam in state.beams) else "displacement"
+        self.field: Field = find_field(field, DRAWN)
         self.undeformed = require_flag("undeformed", undeformed)
         self.frames: list[list[Any]] = []
         self.rigid: list[list[Grid]] = []
