@@ -13,8 +13,7 @@ from .actions.point_force import FollowerForce, MovingForce, PointForce, Train
 from .actions.pairs import BodyContact
 from .actions.obstacles import Circle, Contact, Line, Obstacle, Polygon, SignedDistance
 from .actions.supports import Clamp, Pin, Support
-from .beam import Beam, RigidBody, reference_coordinates
-from .beam.domain import Domain
+from .beam import Beam, Domain, RigidBody, reference_coordinates
 from .core import (AncfError, CallError, CallbackError, CheckpointError, ConvergenceError,
                    FileError, InputError, Interrupted, MeshError, MissingExtra, ModelWarning,
                    NameUnknown, StabilityWarning, SupportError)

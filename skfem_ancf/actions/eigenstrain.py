@@ -12,14 +12,12 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..beam.beam import Beam
+from ..beam import Beam, Layout, WhichBeam, has_history, remembers
 from ..beam.distribution import Distribution
 from ..beam.kernels.kernel import energy_at, strains, stresses_of
 from ..beam.kernels.histories import fibre_points
 from ..beam.kernels.law import CUSTOM, HISTORY, LINEAR, POINTWISE
 from ..beam.kinematics import element_dofs, entries_of
-from ..beam.layout import Layout, WhichBeam
-from ..beam.remembered import has_history, remembers
 from ..beam.strains import on_grid, strain_at, stretched
 from ..core import (Array, InputError, TimeFunction, ask_array, refuse, require_finite_scalar,
                     require_function, shown, stress_of)

@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.beam import Beam
+from ..beam import Beam, Layout, WhichBeam, points_along
 from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, Sampled, groups_of,
                                  surfaces_of)
 from ..beam.kinematics import element_dofs, entries_of
-from ..beam.layout import Layout, WhichBeam
-from ..beam.masses import points_along
 from ..core import (Array, ArrayLike, InputError, NameUnknown, Place, TimeFunction, along, ask,
                     gauss, product_rule, refuse, require_finite, require_flag, require_function,
                     require_module, require_slope)

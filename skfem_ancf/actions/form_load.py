@@ -12,8 +12,7 @@ from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
 from ..beam.distribution import AXIS, BODY, Distribution, Sampled, facets_along
-from ..beam.domain import Domain
-from ..beam.layout import WhichMember
+from ..beam import Domain, WhichMember
 from ..core import (Array, CallbackError, InputError, Place, TimeFunction, along, explained, gauss,
                     refuse, require_finite, require_flag, require_slope, shown, warnings_as_errors)
 from .energy import Density, points_of

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from os import urandom
 from typing import TYPE_CHECKING, Any
 
-from ..beam.layout import Layout
+from ..beam import Layout
 from ..core import Immutable, InputError, explained, refuse, shown
 from .bound import Bound, user_parts
 

@@ -10,14 +10,11 @@ from typing import Any, cast
 import numpy as np
 from scipy import sparse
 
-from ..beam.beam import Beam
+from ..beam import Beam, Domain, Layout, RigidBody, WhichBeam, WhichMember, on_body
 from ..beam.distribution import (AXIS, Distribution, Sampled, add_nodal, divided, on_facets,
                                  on_points, stations_of_vector, surfaces_of)
-from ..beam.domain import Domain
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
-from ..beam.layout import Layout, WhichBeam, WhichMember
-from ..beam.rigid import RigidBody, on_body
 from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,
                     along, ask_field, ask_number, gauss, is_builtin, read_only, refuse,
                     require_finite, require_finite_scalar, require_function, require_slope, sample,

@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..beam import Beam, RigidBody
-from ..beam.domain import Domain
+from ..beam import Beam, Domain, Layout, RigidBody, WhichMember
 from ..beam.kinematics import direction as direction_of, direction_weights, locate, probe_reference
-from ..beam.layout import Layout, WhichMember
 from ..core import Array, ArrayLike, InputError, MeshError, refuse, require_finite, shown
 from ..mesh.places import as_point, is_place, is_point, node_of, points_of_rows
 

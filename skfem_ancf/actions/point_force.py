@@ -7,14 +7,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..beam.beam import Beam
+from ..beam import TURN, Beam, Layout, Points, RigidBody, WhichBeam, WhichMember, on_body
 from ..beam.distribution import Distribution, on_points
 from ..beam.kernels.section import beam_gradients
 from ..beam.kinematics import locate, probe_reference
-from ..beam.layout import Layout, WhichBeam, WhichMember
-from ..beam.masses import TURN
-from ..beam.points import Points
-from ..beam.rigid import RigidBody, on_body
 from ..core import (Array, ArrayLike, TimeFunction, ask, refuse, require_direction, require_finite,
                     require_finite_scalar, require_positive)
 from ..mesh.places import as_point

@@ -7,11 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..beam.beam import Beam
-from ..beam.domain import Domain
+from ..beam import Beam, Domain, Layout, WhichBeam, on_body
 from ..beam.kinematics import plane
-from ..beam.layout import Layout, WhichBeam
-from ..beam.rigid import on_body
 from ..core import InputError, Place, SupportError, require_finite_scalar, require_option, shown
 from ..mesh.places import is_point, node_of
 from .item import Item

@@ -7,10 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam import Beam, RigidBody
-from ..beam.domain import Domain
+from ..beam import Beam, Domain, Layout, RigidBody
 from ..beam.kinematics import direction_weights, probe_reference
-from ..beam.layout import Layout
 from ..core import Array
 from ..mesh.places import facets_of
 from .places import Vector, point

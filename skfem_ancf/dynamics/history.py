@@ -11,9 +11,7 @@ import numpy as np
 
 from ..actions.forces.springs import Turns
 from ..actions.joints.base import Joint
-from ..beam.domain import Domain
-from ..beam.layout import WhichBeam, WhichMember
-from ..beam.points import require_body
+from ..beam import Domain, WhichBeam, WhichMember, require_body
 from ..core import (Array, ArrayLike, InputError, Place, StrPath, refuse, require_finite,
                     require_index, shown)
 from ..equations.system import System

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.joints.base import Joint
-from ..beam.layout import WhichBeam
-from ..beam.points import Located
+from ..beam import Located, WhichBeam
 from ..core.archive import output_file
 from ..core import (Array, CallbackError, CheckpointError, Immutable, InputError, NameUnknown,
                     StrPath, ask_array, refuse, require_flag, require_module, require_option,

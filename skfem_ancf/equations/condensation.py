@@ -16,7 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..actions.joints.nodes import Nodes, chain_ends
-from ..beam.beam import Beam
+from ..beam import Beam
 from ..core.band import NO_FACTORS, SMALL, BandMatrix, Inertia
 from ..core import Array
 from .signature import diagonal_factors

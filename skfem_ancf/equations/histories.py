@@ -11,9 +11,8 @@ import numpy as np
 
 from ..actions.contact.tables import TURNS
 from ..actions.forces.system import Forces
-from ..beam.beam import Beam
+from ..beam import Beam, remembers, with_history
 from ..beam.kernels.histories import ElementsWithHistory, Past, history_size
-from ..beam.remembered import remembers, with_history
 from ..core import Array, InputError
 from ..materials.history import HistoryMaterial
 

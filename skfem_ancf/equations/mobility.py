@@ -10,8 +10,7 @@ import scipy.linalg
 from scipy import sparse
 
 from ..actions.joints.nodes import chain_ends
-from ..beam.domain import Domain
-from ..beam.rigid import RigidBody
+from ..beam import Domain, RigidBody
 from ..core import Array
 from .signature import DENSE, DEPENDENT, groups, null_space, row_sizes, unit_rows
 

@@ -19,10 +19,8 @@ from ..actions.joints.base import UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..actions.tables import MATERIALS, carry_eigenstrains
-from ..beam import Beam, RigidBody
-from ..beam.domain import Domain
+from ..beam import Beam, Domain, Points, RigidBody
 from ..beam.kinematics import bent
-from ..beam.points import Points
 from ..core import Array, InputError, cached_property
 from ..core.band import BandMatrix
 from ..materials.damping import UNDAMPED, Damping

@@ -41,7 +41,7 @@ from skfem.helpers import dot
 
 from ..actions.energy import Energy, points_of
 from ..beam.kinematics import element_dofs
-from ..beam.solid import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
+from ..beam import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
 from ..core import (Array, ArrayLike, InputError, ask_field, refuse, require_finite, require_like,
                     require_positive)
 from ..formulations import get_formulation

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.outlines import around, outlines
-from ..beam.layout import select_member
+from ..beam import select_member
 from ..core import (InputError, StrPath, refuse, require_finite_scalar, require_flag, require_like,
                     require_module, require_option, require_path, require_text)
 from ..core.archive import output_file

@@ -12,12 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..beam import kinematics
-from ..beam.beam import Beam
-from ..beam.domain import Domain, grade_of
-from ..beam.points import BeamPoints
-from ..beam.remembered import by_history, remembers
-from ..beam.solid import displacement_strain
+from ..beam import (Beam, BeamPoints, Domain, by_history, displacement_strain, grade_of, kinematics,
+                    remembers)
 from ..beam.strains import stress_at, stretched
 from ..core import (Array, CallbackError, InputError, NameUnknown, ask, first_order, refuse,
                     require_finite_scalar, require_flag, require_integer, require_label,

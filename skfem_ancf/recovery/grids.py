@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.beam import Beam
-from ..beam.domain import drawn
+from ..beam import Beam, drawn
 from ..core import (Array, InputError, refuse, require_flag, require_integer, require_like, shown,
                     tensor)
 from .fields import DomainValues, Field, Values, values_on_grid

@@ -32,7 +32,7 @@ import scipy
 from scipy.linalg.lapack import dgttrf, dgttrs, dpttrf, dpttrs
 
 from ..beam.distribution import AXIS, SNAP
-from ..beam.remembered import remembers
+from ..beam import remembers
 from ..beam.strains import on_grid, stress_at
 from ..core import Array, Law, angle_of, cached_property, first_order, largest, unwrapped
 from ..formulations import EnhancedContinuum

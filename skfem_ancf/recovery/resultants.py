@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..beam import kinematics
-from ..beam.beam import Beam
-from ..beam.remembered import cable_forces, remembers
+from ..beam import Beam, cable_forces, kinematics, remembers
 from ..beam.strains import cable_axis, on_grid, stress_at
 from ..core import Array, angle_of, first_order, gauss, require_module, unwrapped
 from ..mesh.mapping import cross

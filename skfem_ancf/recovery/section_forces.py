@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial.chebyshev import chebint, chebvander
 
-from ..beam.beam import Beam
+from ..beam import Beam
 from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
 from ..core import AncfError, Array, cached_property, gauss, lagrange
 from ..mesh.mapping import MappingBeam, cross

@@ -11,8 +11,7 @@ import numpy as np
 from ..actions.contact.contacts import YIELDS
 from ..actions.contact.tables import STIFFNESS
 from ..actions.joints.weld import PrescribedDisplacement
-from ..beam import kinematics
-from ..beam.beam import Beam
+from ..beam import Beam, kinematics
 from ..beam.distribution import SNAP
 from ..beam.kinematics import tangents
 from ..core import Array, ModelWarning, StabilityWarning, warn

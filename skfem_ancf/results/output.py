@@ -15,9 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.beam import Beam
-from ..beam.domain import Domain
-from ..beam.layout import Layout, WhichMember, select_member
+from ..beam import Beam, Domain, Layout, WhichMember, select_member
 from ..core import (AncfError, Array, CallbackError, InputError, StrPath, require_flag,
                     require_integer, require_path, require_text)
 from ..core.archive import output_file

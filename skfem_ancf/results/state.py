@@ -16,11 +16,9 @@ from ..actions.item import Item
 from ..actions.joints.base import Joint
 from ..actions.loads import Unscaled
 from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
-from ..beam import Beam, RigidBody
+from ..beam import (Beam, BeamPoints, Domain, DomainPoints, RigidBody, WhichBeam, WhichMember,
+                    require_body, select_beam, select_member)
 from ..beam.distribution import Distribution, Sampled, station_of_node, stations_of_vector
-from ..beam.domain import Domain, DomainPoints
-from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
-from ..beam.points import BeamPoints, require_body
 from ..core import (Array, Immutable, InputError, NearMisses, Place, cached_property, first_order,
                     refuse, require_flag, require_integer, require_option, step)
 from ..equations.evaluation import UNSEEN

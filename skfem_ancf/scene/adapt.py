@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.joints.nodes import chain_ends
-from ..beam.beam import Beam
+from ..beam import Beam
 from ..core import (AncfError, Array, ConvergenceError, InputError, ModelWarning, gauss,
                     require_integer, require_option, require_positive, warn)
 from ..elements.base import DEGREES

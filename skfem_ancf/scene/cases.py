@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..actions.loads import Load
-from ..beam.layout import WhichBeam, select_beam
+from ..beam import WhichBeam, select_beam
 from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar, require_like,
                     require_option)
 from ..results.output import supports_of

@@ -11,9 +11,8 @@ from ..actions.joints.nodes import COMPONENTS, Nodes, chain_ends
 from ..actions.loads import DeadLoad, EndMoment, LineLoad, Load, number_at
 from ..actions.places import members_at
 from ..actions.symbols import Symbol, at_node, force_symbol
-from ..beam import Beam, RigidBody
+from ..beam import Beam, Layout, RigidBody, WhichBeam, WhichMember
 from ..beam.kinematics import direction
-from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..core import (Array, ArrayLike, InputError, TimeFunction, refuse, require_finite,
                     require_finite_scalar, require_function, require_integer, require_names,
                     require_option, require_options, require_positive, require_unmasked, shown)

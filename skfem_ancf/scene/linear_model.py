@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..actions.loads import Load
-from ..beam.points import BeamPoints
+from ..beam import BeamPoints
 from ..core import (Array, ArrayLike, InputError, ModelWarning, SupportError, refuse,
                     require_finite, require_integer, warn)
 from ..dynamics.sensors import Sensor, locate, read

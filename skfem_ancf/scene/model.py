@@ -24,9 +24,7 @@ from ..actions.obstacles import Obstacle
 from ..actions.pairs import BodyContact
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support
-from ..beam import Beam, RigidBody
-from ..beam.domain import Domain
-from ..beam.layout import Layout, WhichMember
+from ..beam import Beam, Domain, Layout, RigidBody, WhichMember
 from ..core import ArrayLike, InputError, NearMisses, TimeFunction, refuse, require_text, shown
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh

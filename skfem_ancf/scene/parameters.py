@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from ..actions.item import Item
-from ..beam.beam import Beam
+from ..beam import Beam
 from ..core import (Array, Immutable, InputError, ask_array, is_builtin, rebuilt, refuse,
                     require_option, shown)
 from ..mesh.mapping import PLACES

@@ -16,9 +16,7 @@ from ..actions.item import Item
 from ..actions.joints import Joint
 from ..actions.loads import Load, bind_load
 from ..actions.point_force import PointForce
-from ..beam.beam import Beam
-from ..beam.layout import WhichBeam, WhichMember, select_beam
-from ..beam.masses import projected
+from ..beam import Beam, WhichBeam, WhichMember, projected, select_beam
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, Interrupted, NameUnknown,
                     StrPath, ask, ask_field, refuse, require_finite, require_finite_scalar,
                     require_function, require_label, require_option, require_positive, shown)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..beam.layout import WhichBeam, select_beam
+from ..beam import WhichBeam, select_beam
 from ..core import Array, StrPath, refuse, require_flag, require_like, require_option
 from ..recovery.fields import units_of, with_unit
 from ..recovery.grids import grids

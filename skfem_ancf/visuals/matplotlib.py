@@ -10,7 +10,7 @@ import numpy as np
 
 from ..actions.obstacles.contact import touching
 from ..actions.obstacles.outlines import AROUND, around
-from ..beam.layout import WhichBeam
+from ..beam import WhichBeam
 from ..core import (ArrayLike, InputError, StrPath, refuse, require_flag, require_integer,
                     require_like, require_module, require_option, require_path, require_positive,
                     require_text, shown)

@@ -15,7 +15,7 @@ from ..actions.obstacles.contact import may_touch
 from ..actions.obstacles.outlines import AROUND, around, outlines
 from ..actions.places import Vector
 from ..actions.symbols import LOADS, Symbol
-from ..beam.layout import Layout
+from ..beam import Layout
 from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar, require_flag,
                     require_positive, require_unmasked, shown)
 from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_of, units_of,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any, NamedTuple
 
-from ...beam.layout import Layout
+from ...beam import Layout
 from ...core import InputError, explained, is_builtin, refuse
 from ..bound import BoundForce, try_force, user_parts
 from ..item import Item

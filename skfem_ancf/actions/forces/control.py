@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...beam.layout import Layout, WhichBeam
-from ...beam.rigid import RigidBody
+from ...beam import Layout, RigidBody, WhichBeam
 from ...core import (Array, InputError, ask_array, ask_number, require_function, require_option,
                      require_positive, shown)
 from ...mesh.places import is_point

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ...beam.beam import Beam
-from ...beam.layout import Layout, WhichBeam, WhichMember
+from ...beam import Beam, Layout, WhichBeam, WhichMember
 from ...core import (Array, ArrayLike, refuse, require_finite, require_finite_scalar,
                      require_not_negative, shown)
 from ..item import Item

@@ -12,8 +12,7 @@ from ...beam.distribution import AXIS, Facets, groups_of, surfaces_of
 from ...beam.kernels.moments import mean_turning
 from ...beam.kernels.section import beam_gradients
 from ...beam.kinematics import probe_reference
-from ...beam.layout import Layout, WhichBeam, select_beam
-from ...beam.rigid import RigidBody, on_body
+from ...beam import Layout, RigidBody, WhichBeam, on_body, select_beam
 from ...core import (Array, InputError, Place, ask_number, gauss, refuse, require_finite_scalar,
                      require_flag, require_function, require_integer, require_not_negative, shown)
 from ...mesh.places import points_of_rows

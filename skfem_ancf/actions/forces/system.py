@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ...beam.domain import Domain
+from ...beam import Domain
 from ...core import Array
 from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...beam.layout import Layout
-from ...beam.rigid import RigidBody
+from ...beam import Layout, RigidBody
 from ...core import Array, ArrayLike, InputError, explained, is_builtin, require_finite, shown
 from ...mesh.places import is_point
 from ..bound import (BoundConstraint, at_generic_displacements, require_derivatives,

@@ -10,9 +10,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ...beam.beam import Beam
+from ...beam import Beam, Layout
 from ...beam.kinematics import direction
-from ...beam.layout import Layout
 from ...core import Array, MeshError, sample
 from ...mesh.frame_graph import FrameGraph
 from ..places import Vector

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...beam import Beam, RigidBody
-from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
+from ...beam import Beam, Layout, RigidBody, WhichBeam, WhichMember, select_beam
 from ...core import (Array, ArrayLike, InputError, array_cache, hermite_basis, refuse,
                      require_direction, require_finite, require_flag, require_label,
                      require_positive, shown)

@@ -11,12 +11,8 @@ from scipy import sparse
 from skfem import BilinearForm
 from skfem.helpers import dot
 
-from ...beam.beam import Beam
-from ...beam.domain import Domain
+from ...beam import Beam, BeamPoints, Domain, Layout, RigidBody, WhichBeam, WhichMember, on_body
 from ...beam.kinematics import plane
-from ...beam.layout import Layout, WhichBeam, WhichMember
-from ...beam.points import BeamPoints
-from ...beam.rigid import RigidBody, on_body
 from ...core import (Array, ArrayLike, InputError, MeshError, Place, TimeFunction, ask_number,
                      require_finite_scalar, require_flag, require_function, require_label, sample,
                      shown)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...beam.kernels.section import beam_gradients
-from ...beam.layout import Layout, WhichBeam, select_beam
+from ...beam import Layout, WhichBeam, select_beam
 from ...core import (Array, ModelWarning, ask_array, gauss_lobatto, refuse, require_function,
                      require_integer, require_not_negative, require_option, require_positive, warn)
 from ..contact.contacts import FIRMER, Group

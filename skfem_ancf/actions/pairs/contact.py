@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ...beam.beam import Beam
-from ...beam.layout import Layout
+from ...beam import Beam, Layout
 from ...core import (Array, InputError, refuse, require_flag, require_label, require_not_negative,
                      require_positive, shown)
 from ..contact.contacts import SEEN
