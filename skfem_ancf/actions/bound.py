@@ -116,6 +116,10 @@ class BoundConstraint(Bound):
         """Time-dependent columns of :meth:`offset`, shape (n, k)."""
         return self.offset(times, N)
 
+    def terms(self, times: Array, N: int) -> tuple[Array, Array]:
+        """:meth:`offset` and the values of :meth:`slope_entries`."""
+        return self.offset(times, N), self.slope_entries(times, N)[2]
+
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         """Rows, columns (k,) and values (n, k) of the reference Jacobian at several times."""
         zero, m = np.zeros(N), len(self.equations)

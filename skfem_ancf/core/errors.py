@@ -633,6 +633,13 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     times = require_finite("times", times, (None,))
 
     def alone(some: Array) -> Array:
+        with suppress(Exception):  # a message for one call is made below
+            found = [function(t) for t in some.tolist()]
+            if {*map(type, found)} <= {float, int, np.float64, np.ndarray}:
+                values = np.array(found)
+                if (values.dtype.kind in "fi" and np.isfinite(values).all()
+                        and shape in (None, values.shape[1:])):
+                    return values.astype(float, copy=False)
         return np.array([ask_array(name + "(t={:g})", shape, function, t) for t in some.tolist()])
 
     n = len(times)
@@ -643,7 +650,8 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
         values = np.asarray(function(times), dtype=float)
         values = values if values.ndim == 1 else np.moveaxis(values, -1, 0)
         few = alone(times[some])
-        if values.shape == (n,) + few.shape[1:] and np.isfinite(values).all() and np.allclose(
-                values[some], few, rtol=1e-13, atol=1e-15 * np.max(np.abs(few), initial=0.0)):
+        size = np.abs(few)
+        if values.shape == (n,) + few.shape[1:] and np.isfinite(values).all() and (
+                np.abs(values[some] - few) <= 1e-13 * size + 1e-15 * size.max(initial=0.0)).all():
             return values
     return alone(times)

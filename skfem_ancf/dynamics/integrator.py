@@ -289,7 +289,8 @@ class Integrator:
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
-        call = self._backend.of(function, OF_STEP * len(rows), calls=True)
+        call = self._backend.of(function, OF_STEP * len(rows), calls=bool(
+            self._nodes or self._couplings))
         try:
             s.histories.put(y.history)
             with np.errstate(all="ignore"):
@@ -489,8 +490,7 @@ class StageIntegrator(Integrator):
 
     @cached_property
     def _backend(self):
-        backend = self.system.backend
-        return backend.with_tables(backend.tables.copied(len(self.scheme.points)))
+        return self.system.backend.copied(len(self.scheme.points))
 
     @cached_property
     def _functions(self):

@@ -190,9 +190,9 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
     tol = None if tol is None else require_positive("tol", tol)
     rtol = require_positive("rtol", rtol)
     refuse(rtol < MIN_RTOL, "rtol must be at least {:g}, got {!r}", MIN_RTOL, rtol)
-    inside = np.unique(require_finite("breakpoints", breaks, (None,)))
-    inside = inside[(inside > t_start + 1e-9 * span) & (inside < t_end - 1e-9 * span)]
-    return Task(t_start, t_end, None if auto else step, tol, rtol, t_eval, tuple(inside.tolist()))
+    inside = {t for t in require_finite("breakpoints", breaks, (None,)).tolist()
+              if t_start + 1e-9 * span < t < t_end - 1e-9 * span} if breaks else ()
+    return Task(t_start, t_end, None if auto else step, tol, rtol, t_eval, tuple(sorted(inside)))
 
 
 def integrator_of(system: System, scheme: Scheme, tol: float | None = None) -> Integrator:

@@ -70,6 +70,7 @@ class Backend:
         self._plain: str | None = None
         self._flat: Any = None  # Equations for compiled code, their words, and all to keep alive
         self._base: Backend | None = None  # the same with another history
+        self._copied: dict[int, Backend] = {}
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif system.forces.contacts.custom:
@@ -93,9 +94,15 @@ class Backend:
     def with_tables(self, tables: Tables) -> Backend:
         """A copy for other tables."""
         backend = copy(self)
-        backend.tables, backend._flat, backend._base = tables, None, None
+        backend.tables, backend._flat, backend._base, backend._copied = tables, None, None, {}
         vars(backend).pop("linearised", None)
         return backend
+
+    def copied(self, n: int) -> Backend:
+        """That of the tables for n displacements at once, see :meth:`Tables.copied`."""
+        if n not in self._copied:
+            self._copied[n] = self.with_tables(self.tables.copied(n))
+        return self._copied[n]
 
     def after(self, tables: Tables) -> Backend:
         """A copy for tables that differ in the history alone, see :meth:`Tables.after`."""

@@ -416,8 +416,11 @@ class Tables:
 
     def driven(self, times: Array) -> Array:
         """c and, if time-dependent, g of all joints at times (n,), shape (n, m + k) or (n, m)."""
-        offsets = self.offsets(times)
-        return np.hstack([offsets, self.slopes(times)]) if self.turns else offsets
+        if not self.turns:
+            return self.offsets(times)
+        s = self.system
+        both = zip(*(joint.terms(times, s.N) for joint in s.constraints.joints))
+        return np.hstack([_beside(x) for x in both])
 
     def at(self, t: float) -> tuple[Array, Array]:
         """c (m,) and g (k,) of all joints at one time."""

@@ -336,12 +336,16 @@ class PrescribedAngle(ComposedJoint):
         a = self.start + sample(self.angle, times, "angle", ())
         return np.column_stack([-np.sin(a), np.cos(a)])
 
+    def terms(self, times: Array, N: int) -> tuple[Array, Array]:
+        n = self._normals(times)
+        return n @ self.d.start[:, None], (n[:, :, None] * self.d.weights).reshape(len(times), -1)
+
     def offset(self, times: Array, N: int) -> Array:
-        return self._normals(times) @ self.d.start[:, None]
+        return self.terms(times, N)[0]
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        values, columns = self._normals(times)[:, :, None] * self.d.weights, self.d.dofs.ravel()
-        return 0 * columns, columns, values.reshape(len(times), -1)
+        columns = self.d.dofs.ravel()
+        return 0 * columns, columns, self.terms(times, N)[1]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = section(layout, self.beam, self.at)[0]
