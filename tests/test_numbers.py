@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                         ElementBeamCable, ElementBeamPatelShabana, InputError, MeshBeam, Scene,
                         Section)
-from skfem_ancf.materials.plane_sections import PlaneSections
+from skfem_ancf.materials.pointwise import PlaneSections
 
 #: Simo's and Vu-Quoc's rod: rotary inertia is that of a section 14 times as high as the stiffness.
 ROD = dict(EA=1e4, EI=500.0, GA=1e4, rhoA=1.0, rhoI=10.0)

@@ -17,7 +17,7 @@ from ..core import (Array, CallError, Immutable, InputError, Rule, ask_array, ga
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..materials.library import LENGTHS
-from ..materials.plane_sections import PlaneSections
+from ..materials.pointwise import PlaneSections
 from ..mesh.mesh_beam import MeshBeam
 from .library import pieces_of
 
