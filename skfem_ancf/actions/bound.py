@@ -513,6 +513,57 @@ def is_table(value: Callable[[Array, float], Array], u: Array,
 
 # user-defined items
 
+class MemberForce(BoundForce):
+    """The force of a domain, or of a bound ``load`` that no load factor scales, on all DOFs of its
+    member, which begin with ``first``."""
+
+    resists = False
+
+    def __init__(self, source: Any, first: int, load: Any = None) -> None:
+        self.source, self.symmetric, self.name, self.load = (
+            source, source.symmetric, source.name, load)
+        self.internal, self.distributed, member = load is None, load is not None, source
+        self._key = getattr(source, "_key", b"")
+        if load is None:
+            self.entries = source.pattern
+        else:
+            member = load.beam
+            self.along, (i, j, _) = (member, [], ()), self._load_entries(np.zeros(member.N), 0.0)
+            self.entries = np.array(i), np.array(j)
+        self.links = [Vector(np.zeros(2), first + k + np.arange(2)[:, None], 1.0)
+                      for k in range(0, member.N, 2)]
+
+    def _at(self, t):
+        """The source at a time, and the sign of its force."""
+        return (self.source, -1.0) if self.load is None else (self.load.acting(t)[1], 1.0)
+
+    def _load_entries(self, u, t):
+        none = np.zeros(0, dtype=int)
+        return (none, none, 0.0 * none) if self.load.constant else self._at(t)[0].stiffness(u)
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        source, sign = self._at(t)
+        return sign * source.force(x.ravel()).reshape(x.shape)
+
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        source, sign = self._at(t)
+        return self.force(x, x, t) if np.array_equal(x, y) else sign * source.mean_force(
+            x.ravel(), y.ravel()).reshape(x.shape)
+
+    def potential_at(self, x: Array, t: float) -> float | None:
+        source, u = self._at(t)[0], x.ravel()
+        if self.load is not None:
+            return source.potential(u)
+        return source.energy(u) if self.symmetric else None
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        u = x.ravel()
+        return -self.source.stiffness(u) if self.load is None else self._load_entries(u, t)[2]
+
+    def __repr__(self) -> str:
+        return repr(self.source)
+
+
 class UserForce(BoundForce):
     """Energy, force and mass of a user-defined item, on pairs of its degrees of freedom. ``past``
     are history and time of an increment, of an item with a memory."""

@@ -12,9 +12,9 @@ from weakref import proxy
 import numpy as np
 from scipy import sparse
 
-from ..actions.bound import BoundConstraint, BoundForce
+from ..actions.bound import BoundConstraint, BoundForce, MemberForce
 from ..actions.forces.kernels import add_resisting_force
-from ..actions.forces.system import DomainForce, Forces
+from ..actions.forces.system import Forces
 from ..actions.joints.base import UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
@@ -161,7 +161,7 @@ class System:
                                        self._holding if elements or any(
                                            map(_holds, self.loads)) or any(
                                                domain.held for domain in domains) else None)
-        self.forces = Forces([*elements, *(DomainForce(domain, self.of(domain).start)
+        self.forces = Forces([*elements, *(MemberForce(domain, self.of(domain).start)
                                            for domain in domains)], self.N, self.bandwidth,
                              None if self.constraints.frame is None else chain_places(self.beams))
         self._whole: System | None = None

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from ..actions.bound import MemberForce
 from ..actions.eigenstrain import EigenStrain
 from ..actions.forces.springs import spring_force, spring_of
 from ..actions.item import Item
 from ..actions.joints.base import Joint
-from ..actions.loads import Unscaled
 from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
 from ..beam import (Beam, BeamPoints, Domain, DomainPoints, RigidBody, WhichBeam, WhichMember,
                     require_body, select_beam, select_member)
@@ -542,7 +542,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         s = system.of(beam)
         acting = [(unit * self.load, load, self.t) for load in system.loads]
         acting += [(unit, e.load, self._time) for e in system.forces.elements
-                   if isinstance(e, Unscaled)]
+                   if isinstance(e, MemberForce) and e.load]
         loads: list[Any] = []
         for scale, load, t in acting:
             if load.beam is beam:

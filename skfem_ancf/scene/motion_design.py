@@ -12,8 +12,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import lsqr
 
-from ..actions.bound import BoundConstraint, BoundForce
-from ..actions.loads import Unscaled
+from ..actions.bound import BoundConstraint, BoundForce, MemberForce
 from ..actions.tables import mean_external_force
 from ..beam.kinematics import element_dofs, entries_of
 from ..core import (Array, ArrayLike, InputError, refuse, require_flag, require_integer,
@@ -526,7 +525,7 @@ def _colours(system, u, t, mean):
     if mean:
         own = [load for load in system.loads if not (
             load.constant or load.turning or load.linear or load.eigen_stresses)]
-        own += [e.load for e in elements if isinstance(e, Unscaled)]
+        own += [e.load for e in elements if isinstance(e, MemberForce) and e.load]
         pairs = [system.of(load).start + np.ravel(load.dofs) for load in system.loads
                  if load.turning and load.couple is not None]
         blocks = [system.of(load) for load in own] + system.slices[

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ...beam import Domain
 from ...core import Array
 from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
-from ..places import Vector
 from ..bound import BoundForce, Remembering, UserForce, is_like, positions, recalled
 from .base import KernelElement
 from .inertia import RotatingFrame
@@ -22,37 +20,6 @@ from .kernels import (ACCEPTING, ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHE
                       RESISTING, TORSION, ForceTables, element_stiffness, potential, run_kinds,
                       vectors_of)
 from .springs import TorsionalSpring
-
-
-# the internal force of a domain as a force element
-
-class DomainForce(BoundForce):
-    """Internal force and tangent of a ``domain``, whose first DOF is ``first``, bound."""
-
-    internal, resists = True, False
-
-    def __init__(self, domain: Domain, first: int) -> None:
-        self.domain, self.symmetric, self.name = domain, domain.symmetric, domain.name
-        self.entries = domain.pattern
-        self.links = [Vector(np.zeros(2), first + k + np.arange(2)[:, None], 1.0)
-                      for k in range(0, domain.N, 2)]
-
-    def force(self, x: Array, v: Array, t: float) -> Array:
-        return -self.domain.force(x.ravel()).reshape(x.shape)
-
-    def mean_force(self, x: Array, y: Array, t: float) -> Array:
-        if np.array_equal(x, y):
-            return self.force(x, 0.0 * x, t)
-        return -self.domain.mean_force(x.ravel(), y.ravel()).reshape(x.shape)
-
-    def potential_at(self, x: Array, t: float) -> float | None:
-        return self.domain.energy(x.ravel()) if self.symmetric else None
-
-    def stiffness(self, x: Array, v: Array, t: float) -> Array:
-        return -self.domain.stiffness(x.ravel())
-
-    def __repr__(self) -> str:
-        return repr(self.domain)
 
 
 #: Kinds that the kernels know.
