@@ -82,7 +82,7 @@ def by_history(beam: Any, e: Array, X: Array, ask: Callable[[Any, Array], Array]
 def cable_forces(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Array, Array]:
     """Normal force and moment (n,) of a cable, from the stress at its integration points."""
     kernel, n = beam.kernel, len(beam.kernel.points)
-    T = sum(of.stress(of.strain(*of.at(np.array(u))[1:])) for of in kernel.elements)
+    T = sum(of.stress(of.strain(*of.at(np.array(u))[1:3])) for of in kernel.elements)
     T = T.reshape(2, n, -1) / kernel.weights.T
     k, s = _places(kernel.points, xi)
     N, M = (1.0 - s) * T[:, k, e] + s * T[:, k + 1, e]
