@@ -154,26 +154,12 @@ def end_history(e, matrices, rule, s, w, state, taken):
     settle(e, (s.acting, s.t), along, w.y[0], w.x.u, w.x.v, taken)
 
 
-@apart("motion", *ALL)
-def finish(e, matrices, rule, s, w, state):
-    """The end of the step becomes the start of the next."""
-    u, v, a1, w1, given = w.x.u, w.x.v, w.x.acceleration, w.x.du, s.supports[2]
-    u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
-    copy(u, u0)
-    copy(v, v0)
-    copy(a1, a0)
-    for i in indices(u.size):
-        w0[i] = w1[i] * e.free[i] + given[i]
-    state.last_dt[0], state.mixed_steps[0] = s.dt, max(0, state.mixed_steps[0] - 1)
-    state.energy[0] = max(state.energy[0], kinetic_energy(matrices.M, v, w.x.scratch))
-
-
 @source
 def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _):
     """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded."""
     # Written for each step: work of damping and history, (n, 1 + k); u, v, a and w, (n, 4, N);
     # multipliers at the end and where they were evaluated, (n, 2, m).
-    contacts, taken = e.forces.contacts, np.empty(1)
+    contacts, taken, w0, w1 = e.forces.contacts, np.empty(1), w.y[3], w.x.du
     for n in range(rows.shape[0]):
         s = step_of(e.joints, rule, data, n)
         if contacts.lasting >= PRESSURES:  # the solution depends on the initial guess
@@ -189,7 +175,14 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
             end_history(e, matrices, rule, s, w, state, taken)
             state.dissipated[0] += taken[0]
             copy(e.history, memories[n, 1:])
-        finish(e, matrices, rule, s, w, state)
+        # the end of the step becomes the start of the next
+        copy(w.x.u, w.y[0])
+        copy(w.x.v, w.y[1])
+        copy(w.x.acceleration, w.y[2])
+        for i in indices(w0.size):
+            w0[i] = w1[i] * e.free[i] + s.supports[2, i]
+        state.last_dt[0], state.mixed_steps[0] = s.dt, max(0, state.mixed_steps[0] - 1)
+        state.energy[0] = max(state.energy[0], kinetic_energy(matrices.M, w.x.v, w.x.scratch))
         copy(shaped(w.y, (w.y.size,)), shaped(rows[n], (w.y.size,)))
         copy(w.m.l0, multiplier_rows[n, 0])
         copy(w.m.last, multiplier_rows[n, 1])

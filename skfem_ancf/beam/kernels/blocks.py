@@ -80,16 +80,6 @@ def add_own(G, used, m, X, Y, back):
                 y[W + e] += a[e] * x[W + e]
 
 
-@source
-def from_rows(t, first, B, F):
-    """F = G^T B."""
-    if len(t.own) == 0:
-        np.dot(t.G.T, B, F)
-        return
-    F[:] = 0.0
-    add_own(block(t.own, first), t.used, len(F), B, F, 1)
-
-
 @apart("StrainTables", CompiledTables, int, F1, F2, F2, F2)
 def displaced(t, first, u, U, d, r):
     """Unknowns, change of the rows, and rows at u."""
@@ -341,7 +331,11 @@ def add_forces_of(t, first, X, T, U, B, F, f):
             for e in range(t.width):
                 b[e] += c[e] * y[e]
                 b[W + e] += c[e] * y[W + e]
-    from_rows(t, first, B, F)
+    if len(t.own) == 0:
+        np.dot(t.G.T, B, F)
+    else:
+        F[:] = 0.0
+        add_own(block(t.own, first), t.used, len(F), B, F, 1)
     if len(U) > 0 and len(t.K) > 0:
         add_constant(t.coupled, block(t.K, first), block(t.Z, first), U, F)
     add_to_nodes(t, first, F, f)

@@ -201,8 +201,15 @@ class Elements:
         return self._last(self.t.weights, OF_WEIGHTS)
 
     def at_points(self, strain: Array) -> Array:
-        """Strains (3, points, ne) at the integration points."""
-        return (self.t.along @ strain).reshape(3, -1, self.ne)
+        """Strains (3 or, of fibres, 1, points, ne) at the integration points."""
+        along = self.t.along  # of each element where the height of a cable varies
+        E = along @ strain if along.ndim == 2 else np.einsum("eps,se->pe", along, strain)
+        return E.reshape(-1, self.t.weights.shape[1], self.ne)
+
+    def _weighted(self, S):
+        """Stresses of the samples from those at the points."""
+        along, S = self.t.along, (S * self.weights).reshape(-1, self.ne)
+        return along.T @ S if along.ndim == 2 else np.einsum("eps,pe->se", along, S)
 
     def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
                ) -> Array:
@@ -216,7 +223,7 @@ class Elements:
         S = self._law_stress(E, C)
         if shift is not None:
             S = self._law_stress(E + shift, C) - S
-        return self.t.along.T @ (S * self.weights).reshape(-1, self.ne)
+        return self._weighted(S)
 
     def _law_stress(self, E, C):
         S = np.empty_like(E)
@@ -227,14 +234,23 @@ class Elements:
 
     @cached_property
     def _to_moduli(self):
-        """Sparse matrix from moduli at the points (9 points) to those between samples (nq)."""
+        """Sparse matrix from moduli at the points (9 points) to those between samples (nq), or one
+        of each element where the height of a cable varies."""
         from scipy import sparse
 
-        (s, z), A = self.t.pairs, self.t.along.reshape(3, -1, self.ns)
-        c = np.abs(A).sum(axis=1).argmax(axis=0)  # component of each sample
-        M = np.zeros((len(s), 9, A.shape[1]))
-        M[np.arange(len(s)), 3 * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
+        (s, z), along = self.t.pairs, self.t.along
+        if along.ndim > 2:
+            return along[:, :, s] * along[:, :, z]
+        A = along.reshape(-1, self.t.weights.shape[1], self.ns)
+        c, n = np.abs(A).sum(axis=1).argmax(axis=0), len(A)  # component of each sample
+        M = np.zeros((len(s), n * n, A.shape[1]))
+        M[np.arange(len(s)), n * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
         return sparse.csr_matrix(M.reshape(len(s), -1))
+
+    def _between(self, D):
+        """Moduli (nq, ne) between samples from those at the points, as if they were symmetric."""
+        M, D = self._to_moduli, (D * self.weights).reshape(-1, self.ne)
+        return M @ D if self.t.along.ndim == 2 else np.einsum("epq,pe->qe", M, D)
 
     def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
         """Weighted stresses (ns, ne), and moduli (nq, ne) between samples."""
@@ -242,9 +258,7 @@ class Elements:
             return self.linear_stress(strain), self.moduli
         both = np.empty((12, len(self.t.along) // 3, self.ne))
         law_evaluate(self.t.law, self.at_points(strain), both)
-        both *= self.weights
-        return (self.t.along.T @ both[:3].reshape(-1, self.ne),
-                self._to_moduli @ both[3:].reshape(-1, self.ne))
+        return self._weighted(both[:3]), self._between(both[3:])
 
     def moduli_at(self, strain: Array, shift: Array | None = None) -> Array:
         """Moduli (nq, ne) between samples, or their change by a shift as in :meth:`stress`."""
@@ -257,7 +271,7 @@ class Elements:
             still, D = D, np.empty_like(D)
             law_evaluate(self.t.law, E + shift, D)
             D -= still
-        return self._to_moduli @ (D * self.weights).reshape(-1, self.ne)
+        return self._between(D)
 
     # force
 

@@ -7,9 +7,8 @@ from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import sparse
 
-from ...core import Array, cached_property
+from ...core import Array
 from .elements import Elements
 from .law import HISTORY, material_of
 from .tables import CABLE, StrainTables
@@ -78,12 +77,6 @@ class ElementsWithHistory(Elements):
         other._own(history, span, now)
         return other
 
-    def at_points(self, strain: Array) -> Array:
-        """Strains (3 or 1, points, ne) at the integration points."""
-        along = self.t.along  # of each element where the height of a cable varies
-        E = along @ strain if along.ndim == 2 else np.einsum("eps,se->pe", along, strain)
-        return E.reshape(-1, self.t.weights.shape[1], self.ne)
-
     def evaluate(self, E: Array, dt: float | None = None) -> tuple[Array, Array, Array]:
         """Stress (c, points, ne), moduli (c, c, points, ne) and history at strains at the points.
         They are at the end of the increment; with ``dt = 0`` at its start."""
@@ -103,10 +96,6 @@ class ElementsWithHistory(Elements):
             return self.material.axial_energy(E[0], history)
         return self.material.energy(self._scale * E, history)
 
-    def _weighted(self, S):
-        along, S = self.t.along, (S * self.weights).reshape(-1, self.ne)
-        return along.T @ S if along.ndim == 2 else np.einsum("eps,pe->se", along, S)
-
     def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
                ) -> Array:
         """Weighted stresses (ns, ne); with a ``change`` of the strain the mean of both ends."""
@@ -115,26 +104,6 @@ class ElementsWithHistory(Elements):
             return self._weighted(self.evaluate(self.at_points(strain))[0])
         E, half = self.at_points(strain), 0.5 * self.at_points(change)
         return self._weighted(0.5 * (self.evaluate(E - half, 0.0)[0] + self.evaluate(E + half)[0]))
-
-    @cached_property
-    def _of_tapers(self):  # of cables of varying height
-        (s, z), along = self.t.pairs, self.t.along
-        return along[:, :, s] * along[:, :, z]
-
-    @cached_property
-    def _to_moduli(self):
-        (s, z), c = self.t.pairs, 1 if self._fibres else 3
-        A = self.t.along.reshape(c, -1, self.ns)
-        of = np.abs(A).sum(axis=1).argmax(axis=0)
-        M = np.zeros((len(s), c * c, A.shape[1]))
-        M[np.arange(len(s)), c * of[s] + of[z]] = A[of[s], :, s] * A[of[z], :, z]
-        return sparse.csr_matrix(M.reshape(len(s), -1))
-
-    def _between(self, D):
-        """Moduli (nq, ne) between samples, as if they were symmetric."""
-        D = (D * self.weights).reshape(-1, self.ne)
-        return self._to_moduli @ D if self.t.along.ndim == 2 else np.einsum(
-            "epq,pe->qe", self._of_tapers, D)
 
     def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
         S, D, _ = self.evaluate(self.at_points(strain))
