@@ -8,7 +8,8 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamCable, Frame, InputError, MeshBeam, RigidBody, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.core.errors import NearMisses
+from skfem_ancf.core import MeshError, refuse
+from skfem_ancf.core.errors import SYNONYMS, NearMisses
 
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
 
@@ -51,6 +52,27 @@ def test_near_misses_name_what_is_meant(things, kind, names, right):
             getattr(things[kind], name)
         assert str(error.value).startswith(
             f"{kind} has no attribute '{name}'; did you mean {right}")
+
+
+def test_what_is_suggested_is_there(things):
+    """Each entry of the table names an attribute of one of the objects, and has synonyms."""
+    there = {name for thing in things.values() for name in dir(thing)}
+    for key, *words in map(str.split, SYNONYMS.split(";")):
+        of_state = key.removeprefix("solve_static().")
+        assert of_state.partition(".")[0].partition("(")[0] in there, key
+        assert words and words == [word.lower() for word in words], key
+
+
+def test_a_refusal_shows_values_on_one_short_line():
+    refuse(False, "{!r} {:d}", object())  # a message that is not needed is not made
+    with pytest.raises(MeshError) as error:
+        refuse(True, "x of {!r} is {:.2f}, not {}", list(range(1000)), 0.125, "a b",
+               error=MeshError)
+    text = str(error.value)
+    assert text.startswith("x of [0, 1, 2, ") and text.endswith("... is 0.12, not a b")
+    assert len(text) < 120
+    with pytest.raises(InputError, match="^give {'a': 1}$"):
+        refuse(True, "give {'a': 1}")
 
 
 def test_what_is_like_nothing_is_just_said(things):

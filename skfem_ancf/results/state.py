@@ -325,11 +325,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
             _inertia=inertia, _verdict=verdict, _motion=motion, _origin=origin, _seen=seen)
 
     def replace(self, **changes: Any) -> State:
-        """A copy with changed attributes, as ``replace(message="guess")``.
-
-        ``error_estimate``, ``scene`` and ``refinements`` are those of an adaptive solution. Raises
-        NameUnknown if an attribute is not known.
-        """
+        """A copy with changed attributes, as ``replace(message="guess")``. ``error_estimate``,
+        ``scene`` and ``refinements`` are those of an adaptive solution. Raises NameUnknown if an
+        attribute is not known."""
         known = [name for name in vars(self) if not name.startswith("_")]
         known += [name for name in ("error_estimate", "scene", "refinements")
                   if name not in known]
@@ -441,11 +439,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
 
     def strain(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
-        """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
-
-        In a domain the components are in global axes. For a linear solution the linear strain.
-        Raises InputError if several lines or beams are equally near to a point, as at a node.
-        """
+        """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n). In a
+        domain the components are in global axes. For a linear solution the linear strain. Raises
+        InputError if several lines or beams are equally near to a point, as at a node."""
         def of(part):
             if not isinstance(part, BeamPoints):
                 return self._values(part, recover).strain

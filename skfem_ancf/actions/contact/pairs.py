@@ -64,9 +64,7 @@ class Facing(NamedTuple):
 
 class PairTables(NamedTuple):
     """The surfaces of members that may touch, see :class:`~skfem_ancf.actions.pairs.facets.Facets`.
-
-    F facets and P points with B pairs of degrees of freedom each, among the ``n`` that are used.
-    """
+    F facets and P points with B pairs of degrees of freedom each, among the ``n`` that are used."""
 
     used: I1  # pairs of degrees of freedom of the scene, (n,)
     dofs: I2  # (B, F)
@@ -370,10 +368,8 @@ def _other(t, found, p, e, guess, known):
 
 @source
 def _mean_place(t, f0, f1, p, e, s0, s1, wanted):
-    """Where between two places the gap changes as ``wanted``, and what that is over the change.
-
-    The gap is least at the closest point, so there is one.
-    """
+    """Where between two places the gap changes as ``wanted``, and what that is over the change."""
+    # The gap is least at the closest point, so there is one.
     low, high = np.minimum(s0, s1), np.maximum(s0, s1)
     x, y = f0.x[p], f1.x[p]
     below = gap_to(t, f1.curve, e, low, y) - gap_to(t, f0.curve, e, low, x) - wanted
@@ -574,10 +570,8 @@ def pair_accept(t, z0, z1, after):
 @apart("pairs", PAIRS, C1, C1, bool, I1, F1, F2, returns=int)
 def pair_stiffness(t, z0, z1, same, facets, zeta, K):
     """Derivative of the resisting force of n pairs by r, t, c and T, twice that of the mean force.
-
     ``facets`` (P,) get those of points in contact, else -1, ``zeta`` (P,) the places on them, K the
-    derivatives, (64, n), for P columns.
-    """
+    derivatives, (64, n), for P columns."""
     f0, f1 = both_faced(t, z0, z1, same)
     met = meet(t, same, f0, f1)
     n, friction, twice = met.at.size, t.friction, 1.0 if same else 2.0

@@ -231,11 +231,8 @@ class BodyContact(ForceElement):
         return self._stiffened(history, found, at, max(deep / AIM, 2.0))
 
     def relaxed(self, x: Array, history: Array) -> Array:
-        """A history with less stiffness, down to what the depth at x needs.
-
-        Of loose members the pressure is small at first: on stiff faces contacts would open and
-        close in turn.
-        """
+        """A history with less stiffness, down to what the depth at x needs. Of loose members the
+        pressure is small at first: on stiff faces contacts would open and close in turn."""
         found, at, deep = self._depth(x)
         factor = max(deep / AIM, SOFTER, SOFTEST / (1.0 + history[0]))
         if self.penalty is not None or factor > PRESSED:
@@ -259,10 +256,8 @@ class BodyContact(ForceElement):
         return new
 
     def least_gap(self, x: Array) -> float:
-        """The least gap at x; 0 if anything touches.
-
-        Points move by at most the largest change of x times ``weights``.
-        """
+        """The least gap at x; 0 if anything touches. Points move by at most the largest change of x
+        times ``weights``."""
         return float(self._faced(_complex(x, x)[0])[0].clear[0])
 
     def stride(self, x: Array, y: Array) -> float:
@@ -287,9 +282,7 @@ class BodyContact(ForceElement):
 
     def look(self, x: Array, t: float, history: Array) -> tuple[Array, ...]:
         """Contact points, and the points that they touch, (2, n) each, and forces on the first.
-
-        Then pressures, gaps, and True for sticking points, (n,), and the members of both, (n,).
-        """
+        Then pressures, gaps, and True for sticking points, (n,), and the members of both, (n,)."""
         tables, f, (found, p) = self._tables(history), self._surfaces.facets, self._faced(
             _complex(x, x)[0])
         e, gap = found.e[p], found.gap[p]
