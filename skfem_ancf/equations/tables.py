@@ -236,9 +236,8 @@ class Tables:
         if all(t.kind == CABLE and t.law.kind == LINEAR and t.rows.shape[1] == len(t.H[0])
                for t in body.packs) and all(beam.mesh.is_straight for beam in beams):
             for t in body.packs:
-                size = np.repeat([2.0, high], t.rows.shape[1] // 2) / t.H
-                limits.append((size[t.at[:, OF_H]] if len(size) > 1 else np.tile(
-                    size, (len(t.start), 1))).ravel())
+                size = np.array([[2.0], [high]]) / t.H.reshape(len(t.H), 2, -1)
+                limits.append(size.take(t.at[:, OF_H], 0).ravel())
         return Axes(np.concatenate(nodes, axis=1), np.concatenate(rest, axis=1),
                     np.concatenate([np.zeros(0), *limits]))
 

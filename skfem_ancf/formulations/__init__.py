@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -359,7 +360,14 @@ def get_formulation(formulation: str | Formulation | type[Formulation]) -> Formu
         return formulation
     if isinstance(formulation, type) and issubclass(formulation, Formulation):
         return formulation()
-    return FORMULATIONS[require_option("formulation", formulation, FORMULATIONS)]()
+    if not isinstance(formulation, str) or formulation not in FORMULATIONS:
+        require_option("formulation", formulation, FORMULATIONS)
+    return _of_name(FORMULATIONS[formulation])
+
+
+@cache
+def _of_name(kind):
+    return kind()
 
 
 __all__ = ["COMPONENTS", "FORMULATIONS", "Assumed", "Continuum", "EnhancedContinuum",

@@ -396,8 +396,11 @@ class MeshBeam(NumberedMesh):
         vars(twin).update(vars(self))
         return MappingBeam(twin)
 
-    def _mapping(self):
+    def mapping(self) -> MappingBeam:
+        """The map from the reference cell, made once."""
         return self._own_mapping
+
+    _mapping = mapping
 
     def params(self) -> Array:
         """Length of each element."""
