@@ -300,7 +300,7 @@ class ElementBeam(Immutable, Element):
             Height and length of a straight element; several lengths have shape (..., 1).
         """
         power, slope = self._powers
-        return h**power * L**slope
+        return h**power * L**slope if self.section.number else L**slope
 
     @cached_property
     def by_reference(self) -> bool:
