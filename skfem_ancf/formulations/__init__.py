@@ -366,7 +366,7 @@ def get_formulation(formulation: str | Formulation | type[Formulation]) -> Formu
 
 
 @cache
-def _of_name(kind):
+def _of_name(kind: type[Formulation]) -> Formulation:
     return kind()
 
 
