@@ -396,11 +396,8 @@ class MeshBeam(NumberedMesh):
         vars(twin).update(vars(self))
         return MappingBeam(twin)
 
-    def mapping(self) -> MappingBeam:
-        """The map from the reference cell, made once."""
+    def _mapping(self):
         return self._own_mapping
-
-    _mapping = mapping
 
     def params(self) -> Array:
         """Length of each element."""
