@@ -380,3 +380,14 @@ def test_bad_direct_construction(p, t, message):
 def test_refused(action, message):
     with pytest.raises(AncfError, match=message):
         action(tagged(MESHES["straight"]()))
+
+
+def test_the_mapping_of_a_mesh_has_its_own_arrays():
+    """What a user does to the arrays that he gave changes neither the mesh nor its mapping."""
+    given = {name: np.array(getattr(MeshBeam.init_line([0.0, 1.0, 2.0], height=0.1), name))
+             for name in ("doflocs", "t", "p_X", "p_Y", "lengths")}
+    mesh = MeshBeam(**given, height=0.1)
+    given["doflocs"][:] += 5.0
+    given["lengths"][:] *= 3.0
+    middle = mesh.mapping().F(np.array([[0.5], [0.5]]))[:, :, 0]
+    np.testing.assert_allclose(middle, [[0.5, 1.5], [0.0, 0.0]], rtol=0, atol=1e-15)

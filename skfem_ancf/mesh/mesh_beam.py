@@ -329,7 +329,7 @@ class MeshBeam(NumberedMesh):
             k = int(np.argmin(has_length))
             a, b = p[:, t[:, k]].T.tolist()
             raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
-        self._mapping().check()
+        MappingBeam(self).check()  # before its arrays are copied: not the mapping that is kept
 
     def with_sections(self, sections: str) -> MeshBeam:
         """The mesh with section directors interpolated "linear", "cubic", ... along the axis.
