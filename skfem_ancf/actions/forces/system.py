@@ -137,7 +137,7 @@ class Forces:
         self._searches = [e.broad_search.fresh() if fresh else e.broad_search for e, _ in paired]
         self.pairs: Any = tuple(
             search.tables._replace(used=at[::2] // 2, history=e.values)
-            for search, (e, at) in zip(self._searches, paired))
+            for search, (e, at) in zip(self._searches, paired)) or NONE
 
     def _couple(self, blocks, places):
         """Find the vectors, ``start + B u``, and the entries of all derivatives by two of them."""
@@ -200,7 +200,7 @@ class Forces:
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._border[0], self._border[1],
             handle if self.custom or self.changing else 0, self.contacts.tables,
-            len(self.changing), self.clear, len(self.pairs), self.pairs or NONE)
+            len(self.changing), self.clear, len(self.pairs), self.pairs)
 
     def acting_rows(self, u: Array, t: float) -> tuple[Array, Array]:
         """Derivatives of positions of concentrated elements, and forces of items, (k, N) each."""
