@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-from skfem_ancf.core import code_cache, source
+from skfem_ancf.core import code_cache
+from skfem_ancf.core.source import MARKED
 from skfem_ancf.core.errors import CompilationWarning
 from skfem_ancf.equations import backend
 from skfem_ancf.solvers.iteration import ITERATIONS
@@ -158,7 +159,7 @@ def test_all_that_is_compiled_marks_the_cache():
              code_cache.compiled_files()}
     assert {"equations/evaluation", "core/loops", "core/jit", "beam/kernels/tables"} <= files
     assert not files & {"core/switch", "core/code_cache", "equations/backend", "scene/scene"}
-    for function, module in source.MARKED.items():
+    for function, module in MARKED.items():
         if module is not None or not function.__module__.startswith("skfem_ancf"):
             continue
         for name in function.__code__.co_names:
@@ -176,7 +177,7 @@ def _ours(function, name, used):
                                                     for a in node.names):
             module = import_module("." * node.level + (node.module or ""),
                                    sys.modules[function.__module__].__package__)
-            if source.MARKED.get(used if callable(used) else None) is not None:
+            if MARKED.get(used if callable(used) else None) is not None:
                 return None  # replaced by its loops
             found = Path(module.__file__)
             return (found.relative_to(PACKAGE).with_suffix("").as_posix()

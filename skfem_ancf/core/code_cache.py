@@ -25,8 +25,9 @@ class NotCompiled(Exception):
 
 
 #: Lines of files that are compiled, and names of others on which compiled code depends.
-_MARKS = re.compile(rb"^\s*(@source|@primitive|@apart|import numba|"
-                    rb"from (numba|\.+(core\.)?source) )", re.MULTILINE)
+_MARKS = re.compile(rb"^\s*(@source|@primitive|@apart|import numba|from (numba|\.+source) |"
+                    rb"from \.+core import (\([^)]*|[^(\n]*)"
+                    rb"\b(source|primitive|apart|indices|[FI][123])\b)", re.MULTILINE)
 _ALSO = "loops.py", "words.py"
 
 
