@@ -221,12 +221,18 @@ class Segment:
 
     # along the axis and across
 
-    def splined(self, values: Array, slopes: Array, s: Array) -> Array:
-        """Cubic spline at s (k,) of values and slopes (..., n, m) at the sections, (..., k, m)."""
+    def with_slopes(self, values: Array) -> Array:
+        """Values (r, n, m) and their derivatives along the segment, (n, 2, r, m)."""
+        both = np.array([values, self.along.d_ds(values)])
+        return np.ascontiguousarray(both.transpose(2, 0, 1, 3))
+
+    def splined(self, both: Array, s: Array, weights: Array) -> Array:
+        """Cubic spline (r, k) at s (k,) through values :meth:`with_slopes`, with weights (k, m)."""
         j = np.minimum(np.maximum(self.s.searchsorted(s, side="right") - 1, 0), len(self.s) - 2)
-        d = self.along.d[j][:, None]
-        t = (s - self.s[j])[:, None] / d
-        (a, b), (u, v) = ((x[..., j, :], x[..., j + 1, :]) for x in (values, slopes))
+        d = self.along.d[j]
+        t = (s - self.s[j]) / d
+        (a, u), (b, v) = ((both.take(i, 0) @ weights[:, None, :, None])[..., 0].transpose(1, 2, 0)
+                          for i in (j, j + 1))
         return a + t * (d * u + t * (3.0 * (b - a) - d * (2.0 * u + v)
                                      + t * (2.0 * (a - b) + d * (u + v))))
 
@@ -424,9 +430,9 @@ class Segment:
 
     @cached_property
     def result(self) -> Any:
-        """Strain, stress and angle, (7, n, m), and their slopes."""
-        found = first_order(np.concatenate([self.strain, self.stress, self.angle[None]]))
-        return found, self.along.d_ds(found)
+        """Strain, stress and angle with their slopes, (n, 2, 7, m)."""
+        return self.with_slopes(first_order(np.concatenate(
+            [self.strain, self.stress, self.angle[None]])))
 
 
 DIVERGED = "the strain is too large: no equilibrium of the section was found"
@@ -609,6 +615,5 @@ class Recovery:
         for k in np.unique(segment):
             on = segment == k
             one = self.segments[k]
-            values = one.splined(*(x[rows] for x in one.result), s[on])
-            out[:, on] = (values * weights[on]).sum(axis=-1)
+            out[:, on] = one.splined(one.result[:, :, rows], s[on], weights[on])
         return out

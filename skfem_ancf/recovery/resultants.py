@@ -235,8 +235,7 @@ def _recovered(recovery, u, e, xi, after):
         start = (one.g[:, 0] - one.g[:, -1]) / (one.Y[..., -1] - one.Y[..., 0])
         curvature = one.rate - start - one.along.d_ds(shear[:, None])[:, 0]
         values = np.array([phi, one.at_axis(stretch), shear, curvature])
-        values = values[..., None]
-        out[:, on] = one.splined(values, one.along.d_ds(values), s[on])[..., 0]
+        out[:, on] = one.splined(one.with_slopes(values[..., None]), s[on], np.ones((on.sum(), 1)))
     return _result(R, M, *out)
 
 
