@@ -123,8 +123,8 @@ def _with_history(dice, law, formulation, E, slope, numbers):
         return elastic
     if kind == 0:
         return f"Prony({elastic}, [0.3], [1e9])"  # at once, on paths too
-    y = float(f"{E * min(0.03, slope * 10.0 ** dice.number(-2, 0.3)):.3g}")
-    hardening = dice.choice((0.0, 1e-3 * E, 0.1 * E, f"Voce({y}, 20.0, {1e-3 * E})",
+    y = float(f"{E * min(0.03, slope * 10.0 ** dice.number(-1, 0.3)):.3g}")
+    hardening = dice.choice((0.01 * E, 1e-3 * E, 0.1 * E, f"Voce({y}, 20.0, {1e-3 * E})",
                              f"[(0, {y}), (0.002, {1.2 * y}), (0.01, {1.3 * y})]"))
     return (f"ElasticPlastic({numbers}, yield_stress={y}, hardening={hardening}, "
             f"kinematic={dice.choice((0.0, 1e-3, 0.1)) * E})")
