@@ -92,7 +92,7 @@ def test_a_motion_keeps_the_energy_and_follows_the_amplitude(element):
         xx=lambda x, y, t: 0.3 * t * np.ones_like(x))
     half = Scene(bar(RUBBER, element, 4)).clamp("left").eigenstrain(xx=0.15).solve_static()
     load, = slow.system.loads
-    factor, acting = load.acting(0.5)
+    factor, acting = load.factor_and_load(0.5)
     assert factor == 1.0
     internal = slow.system.internal_force(half.u)
     free = slow.system.constraints.free

@@ -213,7 +213,7 @@ class BoundForce(Bound):
         """Derivative of the force by the velocities, as :meth:`stiffness`."""
         return derivative(lambda w: self.force(x, w, t), v)
 
-    def stride(self, x: Array, y: Array) -> float:
+    def search_intervals(self, x: Array, y: Array) -> float:
         """Number of intervals in which a line search looks at the force from x to y."""
         return 1.0
 
@@ -535,7 +535,7 @@ class MemberForce(BoundForce):
 
     def _at(self, t):
         """The source at a time, and the sign of its force."""
-        return (self.source, -1.0) if self.load is None else (self.load.acting(t)[1], 1.0)
+        return (self.source, -1.0) if self.load is None else (self.load.factor_and_load(t)[1], 1.0)
 
     def _load_entries(self, u, t):
         none = np.zeros(0, dtype=int)

@@ -205,9 +205,9 @@ class EigenStrain(Load):
     def times(self, factor: float) -> Load:
         return super().times(factor)._with(_size=factor * self.at_rest if self.grows else 1.0)
 
-    def acting(self, t: float | None) -> tuple[float, Load]:
+    def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         if not self.grows:
-            return super().acting(t)
+            return super().factor_and_load(t)
         one = self._thawed()
         one._size = self.factor(t)
         return 1.0, one

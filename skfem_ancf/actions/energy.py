@@ -62,7 +62,7 @@ class Density(Load):
     def first_order(self) -> bool:
         return True
 
-    def acting(self, t: float | None) -> tuple[float, Load]:
+    def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         return self.factor(t), self if t is None else self._with(_time=float(t))
 
     def _slope(self, y, part):

@@ -161,7 +161,7 @@ class Load(Item):
         return self._with(at_rest=factor * self.at_rest, amplitude=Amplitude(
             partial(_factored, factor, self.amplitude)))
 
-    def acting(self, t: float | None) -> tuple[float, Load]:
+    def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         """Factor and load at time ``t``; None in statics."""
         return self.factor(t), self
 
@@ -602,7 +602,7 @@ class TimedLoad(Load):
     def first_order(self) -> bool:
         return False
 
-    def acting(self, t: float | None) -> tuple[float, Load]:
+    def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         last, time = self._last, 1.0 if t is None else float(t)
         if last is None or last._time != time:
             last = self._last = self._now(time)._with(_time=time)
@@ -613,7 +613,7 @@ class TimedLoad(Load):
         return self._with(_vector=vector, _last=None, _distribution=distribution)
 
     def force(self, u: Array) -> Array:
-        return self.acting(None)[1].force(u) if self._vector is None else self._vector
+        return self.factor_and_load(None)[1].force(u) if self._vector is None else self._vector
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         return self.force(u1)
@@ -626,7 +626,7 @@ class TimedLoad(Load):
 
     def distribution(self, u: Array) -> Distribution | None:
         if self._distribution is None:
-            return self.acting(None)[1].distribution(u)
+            return self.factor_and_load(None)[1].distribution(u)
         return self._distribution
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:

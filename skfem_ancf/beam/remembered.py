@@ -37,7 +37,7 @@ def elements_of(beam: Any, k: int) -> Any:
                 if one.layer is layer)
 
 
-def between(beam: Any, k: int, values: Array, e: Array, X: Array) -> Array:
+def interpolated(beam: Any, k: int, values: Array, e: Array, X: Array) -> Array:
     """Values (c, points, ne) of layer k at points X (2, n) of elements e (n,), (c, n)."""
     if beam.has_sections:
         term = beam.layers[k].terms[0]
@@ -73,7 +73,7 @@ def by_history(beam: Any, e: Array, X: Array, ask: Callable[[Any, Array], Array]
     def of(k):
         if not has_history(beam, k):
             return like + other
-        history = between(beam, k, elements_of(beam, k).history, e, X)
+        history = interpolated(beam, k, elements_of(beam, k).history, e, X)
         return ask(beam.across.layers[k].material, history)[:, None]
 
     return beam.across.of_layers(X[:, :, None], like, of, e, False)[:, 0]

@@ -12,7 +12,7 @@ from numpy.polynomial.polynomial import polyval
 
 from ..core import Array, Law, Rule
 from ..formulations import COMPONENTS, Term
-from .remembered import between, elements_of, has_history
+from .remembered import interpolated, elements_of, has_history
 
 
 # Green-Lagrange strain from the displacement derivatives a along the axis and b across it (pairs of
@@ -188,7 +188,7 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
             return S
         own = elements_of(beam, k)
         S, *_ = own.evaluate(own.strain_at(np.array(u.real)))
-        found = between(beam, k, S, e, X)[..., None]
+        found = interpolated(beam, k, S, e, X)[..., None]
         if not beam.has_sections:
             found = np.array([found[0] / stretched(E[0].real)[0], 0.0 * E[0].real, 0.0 * E[0].real])
         return found + 1j * S.imag if np.iscomplexobj(S) else found

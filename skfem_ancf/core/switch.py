@@ -14,7 +14,7 @@ from .errors import InputError
 VARIABLE = "SKFEM_ANCF_COMPILED"
 
 
-def wanted() -> str:
+def compiled_setting() -> str:
     """The environment variable ``SKFEM_ANCF_COMPILED``: "0", "1" or "auto"; else InputError."""
     value = os.environ.get(VARIABLE, "auto")
     if value not in ("0", "1", "auto"):
@@ -25,7 +25,7 @@ def wanted() -> str:
 
 def compiled_off() -> str | None:
     """Why Numba is not used, or None; InputError for an invalid environment variable."""
-    if wanted() == "0":
+    if compiled_setting() == "0":
         return f"{VARIABLE}=0"
     if "NUMBA_DISABLE_JIT" in os.environ and os.environ["NUMBA_DISABLE_JIT"] not in ("", "0"):
         return "NUMBA_DISABLE_JIT is set"

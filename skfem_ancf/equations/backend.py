@@ -14,7 +14,7 @@ from ..beam.kernels.law import CUSTOM, HISTORY
 from ..core import cached_property, code_cache
 from ..core.callbacks import deferred, raise_kept
 from ..core.progress import announced_bar
-from ..core.switch import compiled_off, wanted
+from ..core.switch import compiled_off, compiled_setting
 from .tables import Tables
 
 logger = logging.getLogger(__name__)
@@ -118,7 +118,7 @@ class Backend:
             return Choice("plain", off)
         if not missing:
             return _IS_LOADED
-        if wanted() == "1":
+        if compiled_setting() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
         if missing == [name] and SECONDS[name] <= SHORT:
             return Choice("compiled", "its parts are loaded")

@@ -126,7 +126,7 @@ class Condensed:
         self.at = u.copy(), multipliers.copy()
         K = self._K if self._K.symmetric else self._K.symmetric_part()
         turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
-        scales = self._moves.scales(turns)
+        scales = self._moves.following_scales(turns)
         moments = self._moments(multipliers, scales)
         S, self._parts, self._nodes = np.empty((len(hinged), 6, 6)), [], None  # no two at once
         for group, bases in zip(self.groups, self._bases):
@@ -307,7 +307,7 @@ class _Moves:
         self._at = np.concatenate(rows), np.concatenate(columns)
         self._shape = 3 * len(nodes.nodes), first
 
-    def scales(self, turns: Array) -> Array:
+    def following_scales(self, turns: Array) -> Array:
         """Scales of the equations of ends that follow a rotation, from the turns (ends,) of all."""
         return (np.conj(turns[self._turned]) * turns[self._leading]).real
 

@@ -41,11 +41,11 @@ def linear_external_force(system: System, base: Array, d: Array) -> Array:
     for one in system.loads:
         s, stiff = system.of(one), not one.constant and not (at_rest and not one.first_order)
         if at_rest and one.eigen_stresses:  # eigenstrain of nonlinear laws
-            load, (factor, acting) = cast("Any", one), one.acting(None)
+            load, (factor, acting) = cast("Any", one), one.factor_and_load(None)
             out[s] += load.beam.kernel.scatter(load.small_forces(load.at_rest)) - (
                 factor * acting.force(base[s]))
         if stiff:
-            factor, acting = one.acting(None)
+            factor, acting = one.factor_and_load(None)
             i, j, v = acting.stiffness(base[s])
             np.add.at(out[s], i, factor * np.asarray(v) * d[s][j])
     return out

@@ -211,7 +211,7 @@ def load_stiffness(system: Any, u: Array, load: float, t: float | None = None) -
         if item.constant:
             continue
         s = system.of(item)
-        factor, acting = item.acting(t)
+        factor, acting = item.factor_and_load(t)
         i, j, v = acting.stiffness(u[s])
         K = K - sparse.csr_matrix((load * factor * v, (s.start + i, s.start + j)),
                                   shape=K.shape)

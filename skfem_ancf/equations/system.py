@@ -269,7 +269,7 @@ class System:
         t = self.clock if t is None else t
         out = self.constant_force.copy()
         for load in self._varying:
-            s, (factor, acting) = self.of(load), load.acting(t)
+            s, (factor, acting) = self.of(load), load.factor_and_load(t)
             out[s] += factor * acting.force(u[s])
         return out
 
@@ -280,7 +280,7 @@ class System:
         # those of u.
         t, total, number = self.clock if t is None else t, 0.0, count()
         for load in self.loads:
-            factor, acting = load.acting(t)
+            factor, acting = load.factor_and_load(t)
             if turned is not None and load.turning:
                 total -= factor * cast("EndMoment", load).M * turned[next(number)]
             else:

@@ -73,13 +73,14 @@ class UserDefined:
     def add_custom_force(self, t: float, scale: float, u: Array, out: Array) -> None:
         """Add the force of the loads."""
         for load in self._loads:
-            s, (factor, acting) = self._system.of(load), load.acting(None if np.isnan(t) else t)
+            s = self._system.of(load)
+            factor, acting = load.factor_and_load(None if np.isnan(t) else t)
             out[s] += scale * factor * acting.force(u[s])
 
     def add_custom_mean_force(self, t: float, u0: Array, u1: Array, out: Array) -> None:
         """Add the mean force of the loads from u0 to u1."""
         for load in self._loads:
-            s, (factor, acting) = self._system.of(load), load.acting(t)
+            s, (factor, acting) = self._system.of(load), load.factor_and_load(t)
             force = acting.force(u1[s]) if np.array_equal(u0[s], u1[s]) else acting.mean_force(
                 u0[s], u1[s])
             out[s] += factor * force
@@ -91,7 +92,7 @@ class UserDefined:
         for load in self._loads:
             if np.isinf(t) and not load.first_order:
                 continue
-            first, (factor, acting) = system.of(load).start, load.acting(
+            first, (factor, acting) = system.of(load).start, load.factor_and_load(
                 t if np.isfinite(t) else None)
             i, j, v = map(np.asarray, acting.stiffness(u[system.of(load)]))
             keep = np.full(len(v), not system.symmetric) | (i >= j)

@@ -543,7 +543,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         for scale, load, t in acting:
             if load.beam is beam:
                 at_rest = base is not None and not load.first_order
-                factor, now = load.acting(t)
+                factor, now = load.factor_and_load(t)
                 if isinstance(load, EigenStrain):  # of nonlinear laws it has its size in itself
                     factor = load.factor(t)
                 loads.append((scale * factor, now.distribution(

@@ -292,7 +292,7 @@ def _columns(system, state, loads, joint):
     if joint is None:
         B = np.zeros(system.N)
         for load in loads:
-            s, (factor, acting) = system.of(load), load.acting(state.t)
+            s, (factor, acting) = system.of(load), load.factor_and_load(state.t)
             B[s] += factor * acting.force(np.array(state.u[s]))
         return [(B, np.zeros(system.constraints.m), none)]
     # derivatives of the equations of the joint by what it prescribes

@@ -43,7 +43,7 @@ class Route(NamedTuple):
     times: tuple[float, float] = (0.0, 1.0)
     span: float = 0.0
 
-    def acting(self, level: float) -> tuple[float, float]:
+    def load_and_time(self, level: float) -> tuple[float, float]:
         """Load factor and time at a level."""
         (a, b), (c, d) = self.loads, self.times
         if self.gap is not None:
@@ -80,7 +80,7 @@ class Increment:
                  options: Options) -> None:
         self.system = system.after(start.memory, (level - start.load) * options.route.span)
         self.start, self.level, self.options = start, level, options
-        self.load, self.time = options.route.acting(level)
+        self.load, self.time = options.route.load_and_time(level)
         self.record = LoadStep(level)
 
     @np.errstate(all="ignore")  # overflow shows in the residual
@@ -88,7 +88,8 @@ class Increment:
         """The equilibrium, a stable one if requested; raises LoadStepFailed."""
         system, start, route = self.system, self.start, self.options.route
         found = self._augmented()
-        passed = system.forces.passed((start.u, route.acting(start.load)[1]), (found.u, self.time))
+        passed = system.forces.passed((start.u, route.load_and_time(start.load)[1]),
+                                      (found.u, self.time))
         if passed:
             raise LoadStepFailed(passed)
         if not stable or start.unstable:
@@ -143,7 +144,7 @@ class Increment:
             if k % SLOW == 0:
                 firmness = np.where(contacts.with_multipliers, STIFFER, 1.0) * (
                     1.0 + contacts.firmness) - 1.0
-                contacts.harden(np.minimum(firmness, STIFFEST), found.u, self.time)
+                contacts.set_hardening(np.minimum(firmness, STIFFEST), found.u, self.time)
             found = self.iterate(found)
         raise LoadStepFailed("the penetration of obstacles is above its tolerance after "
                              f"{AUGMENTED} corrections of the pressure")
@@ -161,7 +162,7 @@ class Increment:
                                           most=min(options.most, MOST_FROM_SOFT))
             return self._from_start(chosen) if begin is None else self.iterate(begin, chosen)
 
-        before = self.start.u, options.route.acting(self.start.load)[1]
+        before = self.start.u, options.route.load_and_time(self.start.load)[1]
         return search_contact(contacts, before, self.time, solve,
                               lambda u: self.system.strain_energy(u, self.time), self._response,
                               options.close, options.drag is not None)
@@ -263,7 +264,7 @@ class Increment:
             moved[fixed] = changes
         factors = first = tables.static_factors(self.load)
         if tables.prestressed:
-            first = tables.static_factors(self.load, route.acting(self.start.load)[0])
+            first = tables.static_factors(self.load, route.load_and_time(self.start.load)[0])
         if clock is not None:
             factors = first = self.load * tables.factors(np.array([clock]))[0]
         definite = solver is system.solver and system.symmetric and solver.at_times

@@ -367,7 +367,7 @@ class Search:
         down, far = strategies.Descent(system), options._replace(
             most=min(most, 7 * self.rules.max_iterations))
         # descents start where obstacles have moved to
-        times = (route.acting(level)[1] for level in (0.0, 1.0))
+        times = (route.load_and_time(level)[1] for level in (0.0, 1.0))
         if passed := system.forces.passed(*((result.u, t) for t in times)):
             raise LoadStepFailed(passed)
 
@@ -396,7 +396,7 @@ class Search:
 
     def _ends_stable(self, route):
         """True if the end of a route has to be stable."""
-        return self.stable and route.acting(1.0) == (1.0, self.route.times[1])
+        return self.stable and route.load_and_time(1.0) == (1.0, self.route.times[1])
 
     def _require_good(self, result):
         """Raise LoadStepFailed if a rigid motion is not stabilised, or an axis is folded."""
@@ -425,7 +425,7 @@ class Search:
     def _with_stiff_contact(self, found, step):
         """Solve again, with contact that is stiff enough."""
         start = replace(self._beginning(self.route), u=found.u, multipliers=found.multipliers)
-        loads, times = ((x, x) for x in step.options.route.acting(1.0))
+        loads, times = ((x, x) for x in step.options.route.load_and_time(1.0))
         again = Increment(self.system, start, 1.0, step.options._replace(
             route=Route(found.u, None, loads, times, step.options.route.span), close=True))
         again.record, step.system = step.record, again.system  # with its pressures

@@ -344,7 +344,7 @@ def bound(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
         memory[:] = before
 
 
-def soft(contacts: Contacts, u: Array, t: float) -> Array:
+def releasing_firmness(contacts: Contacts, u: Array, t: float) -> Array:
     """The firmness with which the mean pressure keeps all points in contact, shape (groups,)."""
     out = contacts.firmness.copy()
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
@@ -356,7 +356,8 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
     return out
 
 
-def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -> Array:
+def required_firmness(contacts: Contacts, u: Array, t: float, energy: float,
+                      yields: Array) -> Array:
     """The required firmness, shape (groups,); at least the present one."""
     # ``energy`` is the strain energy including that of the penetration, ``yields`` the result of
     # :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`.
@@ -396,7 +397,7 @@ def search_contact(contacts: Contacts, start: tuple[Array, float], t: float,
     def released():  # rough, on soft obstacles, from points that are bound
         with bound(contacts, flags):
             found = solve(None, True)
-        contacts.harden(soft(contacts, found[0], t), *start)
+        contacts.set_hardening(releasing_firmness(contacts, found[0], t), *start)
         if contacts.anchored:
             with contacts.without_friction():
                 found = solve(found, True)
@@ -445,7 +446,7 @@ class StiffnessRamp:
             u, yields = found[0], np.zeros(len(contacts.groups))
             if any(group.firmest > 1.0 for _, group in contacts.groups):
                 yields = contacts.yielding(u, self.t, self.respond(found))
-            wanted = firm(contacts, u, self.t, self.energy(u), yields)
+            wanted = required_firmness(contacts, u, self.t, self.energy(u), yields)
             if np.all(wanted == contacts.firmness):
                 break
             found, done, rough = self._to(wanted, found, rough)
@@ -461,7 +462,7 @@ class StiffnessRamp:
             before, now = memory.copy(), 1.0 + contacts.firmness
             more = np.clip((1.0 + wanted) / now, 1.0 / step, step)
             last = np.allclose(more * now, 1.0 + wanted, rtol=1e-9)
-            contacts.harden(wanted if last else more * now - 1.0, *self.start)
+            contacts.set_hardening(wanted if last else more * now - 1.0, *self.start)
             try:
                 found = self.solve(found, not last)
             except LoadStepFailed:

@@ -57,7 +57,7 @@ def touching(pair, a, b, at):
 
 
 @source
-def stride(pair, u):
+def relative_travel(pair, u):
     """Largest displacement of an element's middle, relative to the radius of its points."""
     n, way = pair.header[ELEMENTS], 0.0
     rows = np.empty((3, n))

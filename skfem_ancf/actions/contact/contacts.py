@@ -17,12 +17,12 @@ from .active_set import BEYOND, project
 from .crossing import CrossingGuard, middle_of
 from .gap import TINY, places
 from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of_contacts,
-                      of_pair, push, resist, states, untouched, way)
+                      of_pair, press, damp, states, surface_velocities, untouched)
 from .laws import mean_pressure, pressure_slope
 from .poses import carried, taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
                      NUMBERS, POSE, POSES, PRESSURES, RADIUS, RATE, SETTLE, STIFFNESS, TANGENT,
-                     TOLERANCE, TURNS, ContactTables, Pair, Question, SEEN as SEEN_AT, clear_table,
+                     TOLERANCE, TURNS, ContactTables, Pair, Request, SEEN as SEEN_AT, clear_table,
                      pair_of, set_clear, transition, weights_of_motion)
 
 
@@ -229,7 +229,7 @@ class Contacts:
         """Whether a group uses the augmented Lagrangian, (groups,)."""
         return np.array([group.numbers[TOLERANCE] > 0.0 for _, group in self.groups])
 
-    def harden(self, firmness: Array, u: Array, t: float) -> None:
+    def set_hardening(self, firmness: Array, u: Array, t: float) -> None:
         """Set factors of hardening; the tractions of sticking points at u do not change."""
         for k, ((which, _), x, _) in enumerate(self.look(u, t)):
             part, memory = (1.0 + self.firmness[k]) / (1.0 + firmness[k]), self.pair(k).memory
@@ -251,7 +251,7 @@ class Contacts:
             memory[ANCHORED] = 0.0
             for change, force in zip((-CHANGE, CHANGE), out):
                 self.firmness[k] = firm * (1.0 + change) - 1.0
-                of_pair(pair, Question(FORCE, t, 0.0, 0.0, 0, 0), u, u, force, np.empty(1))
+                of_pair(pair, Request(FORCE, t, 0.0, 0.0, 0, 0), u, u, force, np.empty(1))
         finally:
             memory[ANCHORED], self.firmness[k] = sticks, firm - 1.0
         return ((out[0] - out[1]) / (2.0 * CHANGE), push * pressure_slope(a, width) * a,
@@ -291,7 +291,7 @@ class Contacts:
     def _ask(self, what, u, t):
         self._place(t)
         out = np.zeros(1)
-        of_contacts(self.tables, Question(what, t, 0.0, 0.0, 0, 0), u, u, out)
+        of_contacts(self.tables, Request(what, t, 0.0, 0.0, 0, 0), u, u, out)
         return out[0]
 
     # restrictions of solvers
@@ -382,13 +382,13 @@ class Contacts:
             pair, at = self.pair(k), np.arange(len(group.first))
             w, found = np.zeros((ROWS, at.size)), project(pair, NOW, u, at)
             states(pair, True, found, found, at, w)
-            push(pair, at, w)
+            press(pair, at, w)
             add_friction(pair, True, at, w)
             force, pressure = -w[PUSH:PUSH + 2], w[PRESSURE] / group.areas
             if v is not None and group.numbers[DAMPING] > 0.0:
                 places(pair, v, 0.0, at, w[RATES:DEPTH])
-                way(w)
-                resist(pair, 0.0, at, w)
+                surface_velocities(w)
+                damp(pair, 0.0, at, w)
                 force = force - w[PUSH:PUSH + 2]
             out.append((which, w[LAST:LAST + 2] + self.origin[:, None], force, pressure,
                         found[GAP]))
@@ -426,8 +426,8 @@ class Contacts:
         ld = 2 * bandwidth + 1
         A = Band(np.zeros(ld * len(u)), np.zeros(0, dtype=np.int32), ld, bandwidth, bandwidth)
         self._place(t)
-        asked = Question(TANGENT, t, 0.0, 0.0, ld, bandwidth)
-        of_contacts(self.tables, asked, u, u, A.flat)
+        request = Request(TANGENT, t, 0.0, 0.0, ld, bandwidth)
+        of_contacts(self.tables, request, u, u, A.flat)
         at, = np.nonzero(A.flat)
         j, i = np.divmod(at, ld)
         return i + j - bandwidth, j, A.flat[at]

@@ -17,14 +17,14 @@ import numpy as np
 from ...core.band import smallest
 from ...core import F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
-from .active_set import near_points, project, search, stride, touching
+from .active_set import near_points, project, search, relative_travel, touching
 from .gap import SHORT, TINY, carried, distances, levers, places, surface
 from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_slope,
                    return_mapping, slip_of)
 from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, ANCHORS, AREA, AUGMENT, BEGIN, BILATERAL,
                      DAMPED_TANGENT, DAMPING, END, FOLLOWED, FORCE, FRICTION, GAP, LARGEST,
                      MULTIPLIER, NOW, OFFSET, PAIR, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING,
-                     STIFFNESS, TOLERANCE, ContactTables, Question, hardening, is_clear, pair_of,
+                     STIFFNESS, TOLERANCE, ContactTables, Request, hardening, is_clear, pair_of,
                      set_clear, transition)
 
 #: Displacement relative to an element below which a mean is evaluated in the middle.
@@ -43,16 +43,16 @@ INSIDE, NOWHERE = 1e-9, 1e-14
 NX, NY = FOUND + 1, FOUND + 2
 
 
-@apart("contacts", ContactTables, Annotated[Question, MADE], F1, F1, F1)
-def of_contacts(tables, asked, u, v, out):
-    """Add the answer of all pairs to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
-    n, least, end = tables.number, np.empty(tables.number), v if asked.span > 0.0 else u
-    if asked.what != ALONG and untouched(tables, asked.what, u) and (
-            asked.span == 0.0 or untouched(tables, asked.what, end)):
+@apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
+def of_contacts(tables, request, u, v, out):
+    """Add the answer of all pairs to a :class:`~skfem_ancf.actions.contact.tables.Request`."""
+    n, least, end = tables.number, np.empty(tables.number), v if request.span > 0.0 else u
+    if request.what != ALONG and untouched(tables, request.what, u) and (
+            request.span == 0.0 or untouched(tables, request.what, end)):
         return
     for k in range(n):
-        of_pair(pair_of(tables, k), asked, u, v, out, least[k:k + 1])
-    if asked.what == FORCE and tables.clear.size > 0:
+        of_pair(pair_of(tables, k), request, u, v, out, least[k:k + 1])
+    if request.what == FORCE and tables.clear.size > 0:
         set_clear(tables.clear, end, smallest(least))
 
 
@@ -68,11 +68,11 @@ def untouched(tables, what, u):
 
 
 @source
-def of_pair(pair, asked, u, v, out, least):
+def of_pair(pair, request, u, v, out, least):
     """Add the answer of the active points of a pair; of a FORCE set also the least gap."""
-    what, same = asked.what, asked.span == 0.0
+    what, same = request.what, request.span == 0.0
     if what == ALONG:
-        out[1] = max(out[1], stride(pair, v))
+        out[1] = max(out[1], relative_travel(pair, v))
     resists = what == RESISTING or what == DAMPED_TANGENT
     if resists and pair.numbers[DAMPING] == 0.0:
         return
@@ -102,11 +102,11 @@ def of_pair(pair, asked, u, v, out, least):
         return
     if resists or what == ALONG:
         places(pair, v, 0.0, at, w[RATES:DEPTH])
-        way(w)
+        surface_velocities(w)
     if resists:
-        resist(pair, asked.factor, at, w)
+        damp(pair, request.factor, at, w)
     else:
-        push(pair, at, w)
+        press(pair, at, w)
         if what == FORCE:
             _keep_work(pair, w)
         if what == SETTLE:
@@ -121,7 +121,7 @@ def of_pair(pair, asked, u, v, out, least):
         if what == ALONG:
             _add_along(w, S, out)
         else:
-            _add_stiffness(pair, asked, at, S, out)
+            _add_stiffness(pair, request, at, S, out)
 
 
 @apart("contacts", PAIR, bool, F2, F2, I1, F2)
@@ -145,7 +145,7 @@ def states(pair, same, a, b, at, w):
     surface(pair, at, w[MIDDLE:RATES], w[PLACE:FOUND])
     levers(pair, at, w[MIDDLE:RATES], w[LEVER:PUSH])
     distances(pair, NOW, True, w[PLACE:FOUND], w[FOUND:LEVER])
-    way(w)
+    surface_velocities(w)
 
 
 @source
@@ -163,7 +163,7 @@ def _carry(pair, a, w):
 
 
 @source
-def way(w):
+def surface_velocities(w):
     """Velocities of surface points from those of positions and slopes."""
     for k in range(2):
         for i in indices(w.shape[1]):
@@ -175,7 +175,7 @@ def way(w):
 
 
 @apart("contacts", PAIR, I1, F2)
-def push(pair, at, w):
+def press(pair, at, w):
     """Force of the pressure, and its derivative."""
     area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], transition(pair)
     part = hardening(pair)
@@ -221,17 +221,17 @@ def add_friction(pair, same, at, w):
         return
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
     # damps vibrations on the springs; a mean does so by itself
-    calms = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
+    extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
     for i in indices(at.size):
         nx, ny = w[NX, i], w[NY, i]
         slip = slip_of(pose, nx, ny, w[LAST, i], w[LAST + 1, i], memory[ANCHOR_X, at[i]],
                        memory[ANCHOR_Y, at[i]])
         k = sticking * area[at[i]]
-        trial = k * (slip + calms * (slip - memory[SLIP, at[i]]))
+        trial = k * (slip + extrapolates * (slip - memory[SLIP, at[i]]))
         T, sticks = return_mapping(trial, friction * w[PRESSURE, i])
         sticks = np.maximum(sticks, holds)
         change = friction * np.sign(trial) * (1.0 - sticks) * w[SLOPE, i]
-        c = (1.0 + calms if same else 2.0) * k * sticks
+        c = (1.0 + extrapolates if same else 2.0) * k * sticks
         w[PUSH, i] -= T * ny
         w[PUSH + 1, i] += T * nx
         w[K, i] += c * ny * ny + change * ny * nx - T * w[FOUND + 4, i]
@@ -241,7 +241,7 @@ def add_friction(pair, same, at, w):
 
 
 @apart("contacts", PAIR, float, I1, F2)
-def resist(pair, factor, at, w):
+def damp(pair, factor, at, w):
     """Damping force proportional to the pressure, and its derivative."""
     area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
     stiffness, width = pair.numbers[STIFFNESS] * hardening(pair), transition(pair)
@@ -272,8 +272,8 @@ def _settle(pair, same, at, w, out):
             w[WAY, i] * ny)
         if same:
             gone = slip - memory[SLIP, at[i]]
-        calms = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
-        T, _ = return_mapping(k * (slip + calms * gone), limit)
+        extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
+        T, _ = return_mapping(k * (slip + extrapolates * gone), limit)
         after, _ = return_mapping(slip, np.maximum(
             (1.0 - INSIDE) * limit / k - NOWHERE * pair.numbers[RADIUS], 0.0))
         lost[i] = T * gone
@@ -377,14 +377,14 @@ def _add_along(w, S, out):
             add_each(out, where, value)
 
 
-@apart("contacts", PAIR, Annotated[Question, MADE], I1, F2, F1)
-def _add_stiffness(pair, asked, at, S, flat):
+@apart("contacts", PAIR, Annotated[Request, MADE], I1, F2, F1)
+def _add_stiffness(pair, request, at, S, flat):
     """Add the derivatives to a band matrix, or its lower half if only that is stored."""
-    value, where = np.empty(at.size), asked.ld * pair.first[at]
+    value, where = np.empty(at.size), request.ld * pair.first[at]
     n = 2 * pair.weights.shape[0]
     for a in range(n):
         p, c = pair.weights[a // 2], 4 * (a % 2)
-        for b in range(n if asked.top > 0 else a + 1):
+        for b in range(n if request.top > 0 else a + 1):
             q, d = pair.weights[b // 2], b % 2
             for i in indices(at.size):
                 value[i] = p[at[i]] * q[at[i]] * S[c + d, i]
@@ -394,4 +394,4 @@ def _add_stiffness(pair, asked, at, S, flat):
                     value[i] += (p[at[i]] * h[at[i]] * S[c + 2 + d, i]
                                  + g[at[i]] * (q[at[i]] * S[8 + c + d, i]
                                                + h[at[i]] * S[10 + c + d, i]))
-            add_each(flat[b * asked.ld + asked.top + a - b:], where, value)
+            add_each(flat[b * request.ld + request.top + a - b:], where, value)

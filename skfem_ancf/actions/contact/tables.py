@@ -11,7 +11,7 @@ from ...core import F1, F2, I1, MADE, indices, shaped, source
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)
-#: Requests to all pairs, see :class:`Question`.
+#: Requests to all pairs, see :class:`Request`.
 FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64, range(7))
 #: Header of a pair: kind and number of its obstacle, numbers of elements, of points per element, of
 #: pairs of degrees of freedom per point, flag of normals that depend on slopes, number of shape
@@ -44,7 +44,7 @@ TINY = 1e-200
 GAP = 6
 
 
-class Question(NamedTuple):
+class Request(NamedTuple):
     """A request to all pairs at time ``t``, or over a ``span`` of time about it.
 
     ``what`` is FORCE: the mean force from u to v. RESISTING: friction and damping at u for velocity

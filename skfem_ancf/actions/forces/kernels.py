@@ -16,7 +16,7 @@ from ..tables import add_each, add_products
 from ..contact.kernels import FAR, of_contacts, untouched
 from ..contact.pairs import pair_accept, pair_force, pair_tables
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, MARGIN, RATE,
-                              SAFE, SETTLE, TANGENT, TURNS, ContactTables, Question,
+                              SAFE, SETTLE, TANGENT, TURNS, ContactTables, Request,
                               RESISTING as RUBBING, is_clear, set_clear)
 
 #: Kinds of elements.
@@ -157,7 +157,7 @@ def add_elastic_force(tables, t, span, u0, u1, f):
     if tables.changing > 0 and not at_rest(tables, u0, u1):
         _add_changing(tables, t, span, u0, u1, f)
     if tables.contacts.number > 0:
-        add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
+        add_contact(tables.contacts, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
 
 @source
@@ -193,7 +193,7 @@ def add_resisting_force(tables, t, u, v, f):
         add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
 
 
-@apart("contacts", ContactTables, Annotated[Question, MADE], F1, F1, F1)
+@apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
 def add_contact(contacts, asked, u, v, out):
     if contacts.moving > 0:
         call_custom(POSES, contacts.custom, np.int64(0), asked.t, asked.span, contacts.poses,
@@ -207,21 +207,21 @@ def add_contact(contacts, asked, u, v, out):
 
 @source
 def _at(what, t):
-    return Question(what, t, 0.0, 0.0, NONE, NONE)
+    return Request(what, t, 0.0, 0.0, NONE, NONE)
 
 
 @source
 def add_contact_tangent(tables, t, span, u0, u1, A):
     """Add the derivative of the mean contact force by u1 to a band: twice, unless u0 = u1."""
     if tables.contacts.number > 0:
-        add_contact(tables.contacts, Question(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
+        add_contact(tables.contacts, Request(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
 
 
 @source
 def add_friction_tangent(tables, t, factor, u, v, A):
     """Add the derivative of friction and damping to a band; that by velocities times a factor."""
     if tables.contacts.number > 0:
-        add_contact(tables.contacts, Question(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
+        add_contact(tables.contacts, Request(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
                     A.flat)
 
 
@@ -273,7 +273,7 @@ def settle_contact(tables, t, span, u0, u1, out):
     out[0] = 0.0
     follow_turns(tables, u1)
     if tables.contacts.number > 0:
-        add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
+        add_contact(tables.contacts, Request(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
 
 
 @source

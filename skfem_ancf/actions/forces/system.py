@@ -404,7 +404,7 @@ class Forces:
             elif what == PUSHED_BACK and element.resists:
                 out[at] -= np.ravel(element.force(x, y, t) - element.force(x, 0.0 * y, t))
             elif what == ALONG_PUSHING:
-                out[1] = max(out[1], element.stride(x, x + y))
+                out[1] = max(out[1], element.search_intervals(x, x + y))
             elif what == ACCEPTING and isinstance(element, Remembering):
                 out[0] += element.accept(x, y, w[len(u):][at].reshape(-1, 2), t)
         if what == PUSHING:

@@ -135,7 +135,7 @@ class Axis:
         e = self.element(s)
         return self._dofs[e], (self._powers @ (s - e - 0.5) ** self._range) * self._scales[e]
 
-    def between(self, s0: float, s1: float) -> tuple[Array, Array, Array]:
+    def divided_differences(self, s0: float, s1: float) -> tuple[Array, Array, Array]:
         """Weights at two parameters, and their divided differences."""
         (one, a), (two, b) = self.weights(s0), self.weights(s1)
         e, f = self.element(s0), self.element(s1)
@@ -422,7 +422,7 @@ class Sleeve(Joint):
     def _span(self, u0: Array, u1: Array) -> Span:
         ends = u0, u1
         s = [self._parameter(u) for u in ends]
-        dofs, weights, quotients = self.axis.between(*s)
+        dofs, weights, quotients = self.axis.divided_differences(*s)
         columns, rows = _placed(self.p.dofs, self.d.dofs, dofs)
 
         def held(part: int, vector: Vector) -> AffineVector:

@@ -260,14 +260,14 @@ class BodyContact(ForceElement):
         times ``weights``."""
         return float(self._faced(_complex(x, x)[0])[0].clear[0])
 
-    def stride(self, x: Array, y: Array) -> float:
+    def search_intervals(self, x: Array, y: Array) -> float:
         a, b = (self._surfaces.outside(z)[0] for z in _complex(x, y))
         return float(np.max(np.abs(b - a)) / (STRIDE * self.broad_search.height))
 
     def passed(self, x: Array, y: Array, t: float) -> str | None:
         z0, z1 = _complex(x, y)
         self._faced(z1)  # searches if need be
-        if self.stride(x, y) < 1.0 and not len(self.broad_search.candidates.p):
+        if self.search_intervals(x, y) < 1.0 and not len(self.broad_search.candidates.p):
             return None
         if (met := self.broad_search.crossed(z1)) is not None:
             what = "beams have passed through each other"
