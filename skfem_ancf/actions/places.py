@@ -10,7 +10,7 @@ import numpy as np
 from ..beam import Beam, Domain, Layout, RigidBody, WhichMember
 from ..beam.kinematics import direction as direction_of, direction_weights, locate, probe_reference
 from ..core import Array, ArrayLike, InputError, MeshError, refuse, require_finite, shown
-from ..mesh.places import as_point, is_place, is_point, node_of, points_of_rows
+from ..mesh.places import as_point, is_point, node_of, points_of_rows
 
 #: Name of the ground, in place of a beam.
 GROUND = "ground"
@@ -231,7 +231,7 @@ def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
     """A value for each of n beams: given once for all, or once for each."""
     refuse(value is None, "a joint needs {}", what)
     value = points_of_rows(value)
-    if is_place(value):
+    if isinstance(value, (str, np.ndarray)) or callable(value) or is_point(value):  # one place
         return (value,) * n
     if isinstance(value, (tuple, list)) and len(value) == n:
         return tuple(value)

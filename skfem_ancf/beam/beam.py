@@ -120,7 +120,13 @@ class Beam(Immutable):
         if not isinstance(mesh, MeshBeam):
             raise InputError(f"mesh must be a MeshBeam, got {shown(mesh)}")
         self.section = _section(section, width)
-        self._given, self.material = material, _material(self.section, material, mesh)
+        if (material is None) != self.section.has_materials or not isinstance(
+                material, (Material, type(None))):
+            raise InputError(f"material must be None, since {self.section!r} has its own, got "
+                             f"{shown(material)}" if self.section.has_materials else
+                             f"material must be a Material, got {shown(material)}")
+        self._given = material
+        self.material = material or self.section.layers_on(mesh, None)[0].material
         if isinstance(element, str) and element == "auto":
             element = choose_element(mesh, self.material.reference()[0], fields, tolerance)
         if not isinstance(element, ElementBeam):
@@ -380,13 +386,3 @@ def _section(section, width):
         raise InputError('section must be a Section, as Section.profile("I", width=0.05, '
                          f"web=0.005, flange=0.008), got {shown(section)}")
     return section
-
-
-def _material(section, material, mesh):
-    """The material, or the first one of the section."""
-    if (material is None) != section.has_materials or not isinstance(
-            material, (Material, type(None))):
-        raise InputError(f"material must be None, since {section!r} has its own, got "
-                         f"{shown(material)}" if section.has_materials else
-                         f"material must be a Material, got {shown(material)}")
-    return material or section.layers_on(mesh, None)[0].material

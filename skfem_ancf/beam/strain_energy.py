@@ -13,7 +13,7 @@ from .kernels.histories import Past, elements_of, remembering
 from .kernels.law import LINEAR
 from .kernels.runs import (run_accept, run_eigen_force, run_eigen_tangent, run_force,
                            run_linearised, run_put, run_tangent, run_unsymmetric)
-from .kernels.tables import CABLE, StrainTables, repeated, together
+from .kernels.tables import CABLE, StrainTables, repeated, scaled, together
 
 #: Columns of the table of a body: begin and end of stresses; kind.
 BEGIN, END, KIND = range(3)
@@ -100,8 +100,8 @@ def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float])
     for beam, time in zip(beams, times):
         last = first + len(beam.kernel.tables)
         if time > 0.0:
-            packs += [t._replace(start=own.start) for t, own in zip(
-                beam.kernel.viscous_tables(time), body.packs[first:last])]
+            packs += [scaled(t, time)._replace(start=own.start) for t, own in zip(
+                beam.kernel.tables, body.packs[first:last])]
             rows += list(body.table[first:last])
         first = last
     return Body(tuple(packs), np.array(rows)) if packs else body

@@ -367,7 +367,8 @@ class ElementBeam(Immutable, Element):
         """Derivatives of all local functions along and across the axis, and the beam's frame.
         Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints)."""
         _, d_xi, d_eta = self.of_mesh(mapping, X, tind)
-        rates, frame = mapping.in_frame(X, tind)
+        frame = mapping.frame(X, tind)
+        rates = np.einsum("kiep,ijep->jkep", mapping.invDF(X, tind), frame)
         return rates[:, 0] * d_xi[:, None] + rates[:, 1] * d_eta[:, None], frame
 
     # stabilisation, adaptivity

@@ -92,8 +92,8 @@ class Scales:
         if not s.beams:
             mass = sum(body.total_mass for body in s.members)
             return self.energy_of_strains / (mass * s.size**2) or 1.0
-        stiffness = min(b.across.bending_over_mass() for b in s.beams)
-        return stiffness * (np.pi / s.size) ** 4
+        return float(min((b.across.bending[:, None] / b.across.moments(
+            np.array([0.5]), what="mass")[0]).min() for b in s.beams)) * (np.pi / s.size) ** 4
 
     @cached_property
     def inertia_of_places(self) -> float:

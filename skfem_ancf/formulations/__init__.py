@@ -350,8 +350,9 @@ class Assumed(Formulation):
         return out.reshape(len(L), 4 * n, 4 * n)
 
 
-#: The formulations by name.
+#: The formulations by name, and a function that makes one once.
 FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSplit, Assumed)}
+_MADE: Any = cache(lambda kind: kind())
 
 
 def get_formulation(formulation: str | Formulation | type[Formulation]) -> Formulation:
@@ -360,14 +361,7 @@ def get_formulation(formulation: str | Formulation | type[Formulation]) -> Formu
         return formulation
     if isinstance(formulation, type) and issubclass(formulation, Formulation):
         return formulation()
-    if not isinstance(formulation, str) or formulation not in FORMULATIONS:
-        require_option("formulation", formulation, FORMULATIONS)
-    return _of_name(FORMULATIONS[formulation])
-
-
-@cache
-def _of_name(kind: type[Formulation]) -> Formulation:
-    return kind()
+    return _MADE(FORMULATIONS[require_option("formulation", formulation, FORMULATIONS)])
 
 
 __all__ = ["COMPONENTS", "FORMULATIONS", "Assumed", "Continuum", "EnhancedContinuum",

@@ -252,11 +252,6 @@ class MappingBeam(Mapping):
         x, y = d / np.hypot(*d)
         return np.array([[x, -y], [y, x]])
 
-    def in_frame(self, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
-        """Derivatives of xi and eta along and across the axis, and the frame, (2, 2, ...) each."""
-        frame = self.frame(X, tind)
-        return np.einsum("kiep,ijep->jkep", self.invDF(X, tind), frame), frame
-
     def curvature(self, X: Array, tind: Array) -> Array:
         """Curvature of the axis, (nelements, npoints)."""
         d, dd = (self._vectors(0, X[0], tind, k) for k in (1, 2))

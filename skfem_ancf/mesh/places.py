@@ -275,11 +275,6 @@ def points_of_rows(places: Any) -> Any:
     return places
 
 
-def is_place(place: object) -> bool:
-    """True for one place, False for a tuple with a place for each of several beams."""
-    return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
-
-
 def as_point(point: Any, mesh: Any = None) -> Array:
     """A material point as an array (2,): two coordinates, or with a mesh the name of a section."""
     if isinstance(point, str) and mesh is not None and point in (mesh.boundaries or {}):

@@ -509,8 +509,3 @@ class Across(Immutable):
         tind = np.zeros(1, dtype=int) if self.uniform else None
         EA, ES, EI = self.moments(np.array([0.5]), tind, "E")[:, :, 0]
         return EI - ES**2 / EA
-
-    def bending_over_mass(self) -> float:
-        """Smallest ratio of E I to the mass per length."""
-        mass = self.moments(np.array([0.5]), what="mass")[0]
-        return float(np.min(self.bending[:, None] / mass))

@@ -14,7 +14,7 @@ from .elements import Elements
 from .histories import ElementsWithHistory, Past, elements_of, remembering
 from .law import LINEAR, law_evaluate
 from .runs import run_eigen_force, run_eigen_tangent, run_force, run_tangent
-from .tables import StrainTables, apart, repeated, scaled
+from .tables import StrainTables, apart, repeated
 
 #: Approximate number of elements whose energies are evaluated together.
 TOGETHER = 4096
@@ -213,10 +213,6 @@ class ElementKernel:
             found.append(np.array([R, R]))
             stresses.append((R @ self.gather(u).reshape(ne, n, 1))[..., 0])
         return *np.concatenate(found, axis=2), np.concatenate(stresses, axis=1)
-
-    def viscous_tables(self, time: float) -> list[StrainTables]:
-        """Tables of a linear law with ``time`` times the moduli at zero strain."""
-        return [scaled(t, time) for t in self.tables]
 
     def inverted(self, u: Array) -> bool:
         """True if the body is turned inside out somewhere."""

@@ -87,14 +87,9 @@ class SectionKernel(ElementKernel):
         return samples, volumes
 
     @property
-    def firsts(self) -> list[Integral]:
-        """The first integral of each layer."""
-        return [one for one in self.integrals if one.first]
-
-    @property
     def volume(self) -> float:
         return sum(float(np.sum(one.volumes)) * (self.t.shape[1] // len(one.volumes))
-                   for one in self.firsts)
+                   for one in self.integrals if one.first)
 
     @property
     def scale(self) -> float:
