@@ -113,11 +113,11 @@ class Backend:
     def choose(self, name: str, iterations: float = 1.0) -> Choice:
         """The choice for the next call of a kernel, by its name and expected iterations."""
         missing = self._missing(name)
+        if not (missing or self._plain or PROBLEMS) and compiled_setting() != "0":
+            return _IS_LOADED
         off = self._plain or (PROBLEMS[0] if PROBLEMS else compiled_off())
         if off is not None:
             return Choice("plain", off)
-        if not missing:
-            return _IS_LOADED
         if compiled_setting() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
         if missing == [name] and SECONDS[name] <= SHORT:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -345,24 +346,24 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     if drag is not None:
         return _loose(system, last, t, drag, start, Options(
             route, "mixed", rules.tol, rules.max_iterations, close=True), smallest)
-    search = Search(system, last.result.u, last.result.memory, rules, stable, False,
-                    t - last.t)
-    bounded = search.touches or search.stabilised_by_loads
+    search = partial(Search, system, last.result.u, last.result.memory, rules, stable, False,
+                     t - last.t)
+    bounded = (system.forces.contacts.obstacles or system.forces.changing
+               or system.constraints.missing_supports)
     for method in ("mixed", "descent" if bounded else "newton", *(("all",) if smallest else ())):
         try:
             if method == "all":
                 logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
-                result = search.find()
+                result = search().find()
                 method = result.attempts[-1].strategy
                 result.rubbed += last.result.rubbed
             elif method == "descent":
-                result = search.descent(most=BOUNDED)
+                result = search().descent(most=BOUNDED)
                 result.rubbed += last.result.rubbed
             else:
                 step = Increment(system, start, 1.0, Options(
                     route, method, rules.tol, rules.max_iterations, method == "mixed", True))
-                with np.errstate(all="ignore"):  # overflow shows in the residual
-                    result = step.reached(step.solve(stable))
+                result = step.reached(step.solve(stable))
         except LoadStepFailed as failure:
             failed = failure
             continue

@@ -348,9 +348,9 @@ class Scene(Model):
                 if (goal, max_elements, max_degree) != (GOALS[0], MOST_ELEMENTS, DEGREES[-1]):
                     raise InputError("goal=, max_elements= and max_degree= are of an adaptive "
                                      "solution: give adapt=, its tolerance, too")
-                u = None if start is None else displacement(self.system, start)
-                memory = self.system.histories.of_state(start)
-                state = solve_static(self.system, u, memory, find)
+                system = self.system
+                u = None if start is None else displacement(system, start)
+                state = solve_static(system, u, system.histories.of_state(start), find)
             elif start is None:
                 state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)
             else:

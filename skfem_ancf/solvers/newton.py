@@ -127,6 +127,15 @@ class Search:
     ``touches`` if there are obstacles, or members that may touch. ``attempts`` lists the strategies
     tried."""
 
+    #: The first correction of the mixed iteration was far too large, as for a slack rope.
+    _too_large = False
+    _loose = ""  # an unstabilised motion in words
+    _furthest: StaticResult | None = None
+    _other: StaticResult | None = None
+    _folded: StaticResult | None = None
+    _failure: Exception | None = None
+    _spent, _unstabilised, _unstable = 0, 0, False
+
     def __init__(self, system: System, u: Array | None, memory: Array | None, rules: Steps,
                  stable: bool, progress: bool | None, span: float = 0.0) -> None:
         self.system = system = system.after(memory, span)
@@ -137,14 +146,6 @@ class Search:
         self._has_friction = bool(contacts.anchored)
         self._auto, self._at_once = rules.method == "auto", rules.first_step == 1.0
         self.attempts: list[Attempt] = []
-        #: The first correction of the mixed iteration was far too large, as for a slack rope.
-        self._too_large = False
-        self._loose = ""  # an unstabilised motion in words
-        self._furthest: StaticResult | None = None
-        self._other: StaticResult | None = None
-        self._folded: StaticResult | None = None
-        self._failure: Exception | None = None
-        self._spent, self._unstabilised, self._unstable = 0, 0, False
         times = (0.0, 1.0) if clock is None else (clock, clock)
         memory = system.histories.begin(np.zeros(system.N) if u is None else u,
                                         times[u is not None], memory is None)
@@ -247,8 +248,8 @@ class Search:
         # If it was not found easily, the path from the reference configuration is followed: has the
         # load a maximum below 1?
         system, loads = self.system, [0.0]
-        own = any(hasattr(load, "psi") for load in system.loads)
-        if (not result.doubt and (len(self.attempts) > 1 or (own and result.iterations > SURE))
+        if (not result.doubt and (len(self.attempts) > 1 or (result.iterations > SURE and any(
+                hasattr(load, "psi") for load in system.loads)))
                 and self._auto and self.stable and self.route.proportional
                 and not (self.stabilised_by_loads or self.touches) and system.clock is None):
 
@@ -432,10 +433,8 @@ class Search:
         return again.solve(self.stable)
 
     def _beginning(self, route):
-        system = self.system
-        return StaticResult(route.u.copy(), np.zeros(system.constraints.m), 0.0,
-                            np.zeros(system.N), [], False, "no load step has converged",
-                            memory=self._memory)
+        return StaticResult(route.u, np.zeros(self.system.constraints.m), 0.0, None, [], False,
+                            "no load step has converged", memory=self._memory)
 
     def load_steps(self, method: str, route: Route | None = None,
                    result: StaticResult | None = None, size: float | None = None,

@@ -49,7 +49,7 @@ class StaticResult:
     Attributes
     ----------
     u, multipliers, force
-        Displacement (N,), multipliers (m,) and internal force (N,).
+        Displacement (N,), multipliers (m,), and internal force (N,) if known.
     load
         The load factor reached.
     steps
@@ -76,7 +76,7 @@ class StaticResult:
     u: Array
     multipliers: Array
     load: float
-    force: Array
+    force: Array | None
     steps: list[LoadStep]
     converged: bool
     message: str

@@ -369,8 +369,9 @@ class Forces:
         """Why a step must not lead from a displacement and time to others, or None."""
         if text := self.contacts.passed(a, b):
             return text
-        for element, at in self.changing if not all(is_clear(self.clear, u, 0.0) for u, _ in (
-                a, b)) else ():
+        if not self.changing or all(is_clear(self.clear, u, 0.0) for u, _ in (a, b)):
+            return None
+        for element, at in self.changing:
             if text := element.passed(*(u[at].reshape(-1, 2) for u in (a[0], b[0])), b[1]):
                 return text
         return None
