@@ -184,7 +184,7 @@ def hold_back(e, t, loose, u, R, du, dm):
     if loose == 0.0 and nothing_touches(e.forces, u) and nothing_touches(e.forces, ahead):
         return
     contact_along(e.forces, t, u, du, two)
-    if not work > 0.0:
+    if not work > 0.0 and loose == 0.0:
         return
     parts, most = int(min(max(np.ceil(two[1]), 1.0), PARTS)), 1.0
     if loose > 0.0 and two[1] > 1.0:

@@ -47,8 +47,8 @@ SLOW, PATIENCE = 1e-2, 30
 FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
 #: Drag of loose beams relative to their softest bending, that of a free beam over E I / L^4; its
 #: least value per length and width, relative to E; factors for an increment that fails. Iterations
-#: from a guess.
-DRAG, FREE, LEAST_DRAG, MORE_DRAG, GUESSED = 0.02, 500.0, 1e-9, (10.0, 100.0, 1e3), 15
+#: from a guess, and least number of those allowed otherwise: contacts open and close in turn.
+DRAG, FREE, LEAST_DRAG, MORE_DRAG, GUESSED, LOOSE = 0.02, 500.0, 1e-9, (10.0, 100.0, 1e3), 15, 60
 
 
 # named steps of a quasi-static run
@@ -382,6 +382,7 @@ def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticRe
     # which bodies snap through in several increments.
     dt, u = t - last.t, last.result.u
     start.memory = system.histories.after(start.memory).relaxed(u)
+    options = options._replace(most=max(options.most, LOOSE))
     tries: list[Any] = [] if last.velocity is None else [
         options._replace(drag=drag, guess=u + dt * last.velocity, most=min(GUESSED, options.most))]
     tries += [options._replace(drag=factor * drag, method="newton")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..actions.contact.tables import is_clear
 from ..actions.tables import add_constraint_rate
-from ..core.band import add_multiple, dot, largest, multiply, solve_definite
+from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
 from ..core import F1, MADE, apart, indices, source
 from ..equations.convergence import (CLOSED, FEWEST, NEVER, diverges, is_balanced,
@@ -19,6 +19,8 @@ from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, 
 
 #: Approximate iterations to an equilibrium, by which work in NumPy is counted.
 ITERATIONS = 8
+#: Of loose members: factors on the drag in tangents that are not definite, and the largest one.
+MORE_DRAG, MOST_DRAG = 30.0, 1e6
 #: How an iteration ends; the last is that of compiled code whose factors need LAPACK.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE = range(5)
 
@@ -68,7 +70,13 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         else:
             for i in indices(phi.size):
                 phi[i] = -phi[i]
+            stiff, more = e.K.flat.copy() if loose > 0.0 else e.K.flat[:0], 1.0
             good = call_solver(target.solver, target.at, u, multipliers, R, phi, du, dm)
+            while loose > 0.0 and good and dot(R, du) < 0.0 and more < MOST_DRAG:
+                more *= MORE_DRAG  # what snaps through is held, so that corrections go downhill
+                e.K.flat[:] = stiff
+                add_to_diagonal(e.K, more * x[DRAG])
+                good = call_solver(target.solver, target.at, u, multipliers, R, phi, du, dm)
         before, work = work, np.inf
         if good:
             work = np.sqrt(abs(dot(R, du)) + abs(dot(phi, dm)))

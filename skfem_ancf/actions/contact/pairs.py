@@ -24,8 +24,8 @@ from .laws import mean_pressure, mean_pressure_slope, return_mapping
 #: Iterations of the projection, its largest step along a facet, and how far it may leave it.
 PROJECT, FAR, LEFT = 12, 1.0, 1.5
 #: A point is on a facet if its projection leaves it by less, so that round-off does not decide
-#: about points on edges, as of equal rods that collide.
-EDGE = 0.02
+#: about points on edges, as of equal rods that collide. The same for ends that go on as an arc.
+EDGE, ON = 0.02, 1e-6
 #: No contact of a beam with itself, or with a beam that it is joined to, within so many heights.
 APART = 3.0
 #: Largest penetration, in heights; a point as deep as the height lies on the other face.
@@ -48,6 +48,7 @@ class Candidates(NamedTuple):
     p: I1
     e: I1
     zeta: F1
+    group: I1  # numbers of pairs of a point and a chain
 
 
 class Facing(NamedTuple):
@@ -77,6 +78,7 @@ class PairTables(NamedTuple):
     spans: F1
     heights: F1
     firmness: F1
+    reach: F2  # the least and largest zeta of closest points, (2, F)
     near: F1  # distance of a point of a facet from the guess for it
     members: I1
     chains: I1
@@ -187,7 +189,7 @@ def clipped(x, low, high):
 
 
 @source
-def project(curve, e, zeta, x):
+def project(t, curve, e, zeta, x):
     """The closest point of facets e to x, from a guess: zeta, and True if it is there."""
     step = 0.0 * zeta
     for _ in range(PROJECT):
@@ -200,7 +202,7 @@ def project(curve, e, zeta, x):
         still, zeta = np.abs(new - zeta), new
         if everywhere(still < 1e-14):
             break
-    return zeta, (np.abs(step) < 1e-9) & (np.abs(zeta) <= 1.0 + EDGE)
+    return zeta, (np.abs(step) < 1e-9) & (zeta >= t.reach[0, e]) & (zeta <= t.reach[1, e])
 
 
 # what points face
@@ -255,10 +257,12 @@ def _face(t, known, near, found):
     curve, n, P = found.curve, near.size, found.x.size
     zeta, gap, away, beyond = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     of, facets, order = np.empty(n, np.int64), np.empty(n, np.int64), np.arange(n)
+    front, groups = np.full(known.p.size, NOTHING), np.empty(n, np.int64)
+    before = np.empty(n)
     for i in indices(n):
         p, e = known.p[near[i]], known.e[near[i]]
         x = found.x[p]
-        s, there = project(curve, e, known.zeta[near[i]], x)
+        s, there = project(t, curve, e, known.zeta[near[i]], x)
         s = where(there, s, clipped(s, -1.0, 1.0))
         c, T, _ = along(curve, e, s)
         outer, d, begins = scaled(t.sides[e] / size(T), turned(T)), x - c, t.begins[p]
@@ -270,7 +274,13 @@ def _face(t, known, near, found):
         away[i] = where(fits, np.abs(g) + np.maximum(np.abs(s) - 1.0, 0.0) * t.lengths[e], NOTHING)
         away[i] = where(joined, NOTHING, away[i])
         zeta[i], gap[i], of[i], facets[i] = s, g, p, e
+        groups[i], before[i] = known.group[near[i]], where(
+            there & (g > 0.0), where(joined, NOTHING, g), NOTHING)
     found.clear[0] = min(found.clear[0], smallest(beyond))
+    # what is in front of the nearest face of an outline is not behind another one of it
+    least_each(front, groups, before)
+    for i in indices(n):
+        away[i] = where(away[i] > front[groups[i]], NOTHING, away[i])
     least, first = np.full(P, 0.5 * NOTHING), np.full(P, n)
     least_each(least, of, away)
     for i in indices(n):
@@ -360,7 +370,7 @@ def meet(t, same, f0, f1):
 def _other(t, found, p, e, guess, known):
     """Place and gap of pairs at a state, of known ones and others; no penetration of those that
     are apart."""
-    s, there = project(found.curve, e, guess, found.x[p])
+    s, there = project(t, found.curve, e, guess, found.x[p])
     s = where(there, s, guess)
     gap = np.maximum(gap_to(t, found.curve, e, s, found.x[p]), t.begins[p])
     return where(known, found.zeta[p], s), where(found.e[p] >= 0, found.gap[p], gap)

@@ -16,7 +16,7 @@ from ..contact.pairs import (COMPONENTS, VECTORS, along, faced, forces, meet, pa
                              pair_force, pair_stiffness, place, potential, rubbing, stiffness_of)
 from ..forces.base import ForceElement
 from ..places import Vector
-from .facets import facets_of
+from .facets import ROUND, facets_of, rounded
 from .search import Search, Surfaces
 
 #: Width of the transition from no pressure to proportional pressure, in heights, as of obstacles.
@@ -118,9 +118,10 @@ class BodyContact(ForceElement):
         used, allowed = self._members(layout)
         beams = [k for k in used if isinstance(layout.members[k], Beam)]
         origin = complex(*np.mean([layout.members[k].origin for k in used], axis=0))
-        surfaces = Surfaces(_widened(facets_of(layout, used, origin), beams))
-        self.dofs = np.unique(surfaces.facets.dofs)
-        f = surfaces.facets._replace(dofs=np.searchsorted(self.dofs, surfaces.facets.dofs))
+        f = _widened(facets_of(layout, used, origin), beams)
+        f = rounded(f, ROUND * float(np.min(f.heights)))
+        self.dofs = np.unique(f.dofs)
+        f = f._replace(dofs=np.searchsorted(self.dofs, f.dofs))
         surfaces = Surfaces(f)
         if not np.isfinite(f.firmness).any() and self.penalty is None:
             raise InputError(f"{self!r} has no beam, whose modulus would give a stiffness: give "
@@ -317,7 +318,9 @@ class BodyContact(ForceElement):
         own, other = (-(np.conj(N) * a + np.conj(D) * b).T for (N, D), a, b in (
             ((t.N[:, p], t.D[:, p]), R[0], R[1]), (C, R[2], R[3])))
         for e, zeta, part in ((f.of[p], f.zeta[p], own), (met.e, met.zeta, other)):
-            xi = 0.5 + 0.5 * np.clip(np.where(f.spans[e] > 0.0, zeta, -f.sides[e]), -1.0, 1.0)
+            left, right = f.ends[e].T
+            xi = np.clip(np.where(f.spans[e] > 0.0, (zeta - left) / (right - left),
+                                  0.5 - 0.5 * f.sides[e]), 0.0, 1.0)
             for k, node in enumerate(self.dofs[f.dofs[e, 0]]):
                 out += [(n, float(xi[k]), _plane(part[k, :nb]).T)
                         for n in np.flatnonzero(nodes == node).tolist()]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from ...beam import Beam, RigidBody
 from ...beam.kernels.section import beam_gradients
@@ -19,6 +20,9 @@ from ..obstacles.obstacle import face_width, lobatto, stiffest
 ACROSS = 3
 #: Points along an edge of a rigid body, and largest number of such intervals.
 EDGE, PARTS = 4, 50
+#: Radius of convex corners, in heights; least change of direction there; distance of ends that
+#: meet, largest distance of the arc from the corner, both in radii, and in lengths of facets.
+ROUND, TURN, MEET, LONGEST, PART = 0.05, 0.35, 1e-2, 3.0, 0.25
 
 
 class Facets(NamedTuple):
@@ -42,6 +46,7 @@ class Facets(NamedTuple):
     spans: Array
     heights: Array
     firmness: Array
+    ends: Array  # zeta of the ends of the facet before its corners were rounded, (F, 2)
     of: Array  # facets of points, (P,)
     zeta: Array
     areas: Array
@@ -91,8 +96,93 @@ def _facets(dofs, weights, x, zeta, rule, widths, **values):
     kinds = {name: value + (0 * number if name in ("chains", "curves") else np.zeros(F))
              for name, value in one.items()}
     return Facets(dofs=dofs, weights=weights @ fit, starts=starts, members=number,
+                  ends=np.tile([-1.0, 1.0], (F, 1)),
                   lengths=speed @ w, of=np.repeat(number, len(points)), zeta=np.tile(points, F),
                   areas=(speed * w * widths).ravel(), **kinds)
+
+
+def rounded(f: Facets, radius: float) -> Facets:
+    """Facets with an arc at each convex corner of outlines, which moves with the material there.
+
+    At a sharp corner the closest face, and with it the force, would change from one to the other.
+    Corners remain points that press on other members.
+    """
+    n = max(f.starts.shape[1], 4)
+    f = f._replace(starts=np.pad(f.starts, ((0, 0), (0, n - f.starts.shape[1]))),
+                   weights=np.pad(f.weights, ((0, 0), (0, 0), (0, n - f.weights.shape[2]))))
+    number, both = np.arange(len(f.sides)), np.array([-1.0, 1.0])
+    T = f.starts[:, 1:] * np.arange(1.0, n) @ np.vander(both, n - 1, increasing=True).T
+    x = f.starts @ np.vander(both, n, increasing=True).T + (
+        1j * f.sides * f.offsets)[:, None] * T / np.abs(T)
+    # counterclockwise a facet begins at zeta = side
+    first, last = ((sign * f.sides > 0.0).astype(int) for sign in (1.0, -1.0))
+    way = -f.sides[:, None] * T / np.abs(T)
+    trees = [scipy.spatial.cKDTree(np.column_stack([y.real, y.imag])) for y in (
+        x[number, last], x[number, first])]
+    met = trees[0].sparse_distance_matrix(trees[1], MEET * radius, output_type="ndarray")
+    a, b = met["i"], met["j"]
+    turn = np.angle(np.conj(way[a, last[a]]) * way[b, first[b]])
+    some = (f.members[a] == f.members[b]) & (turn > TURN)
+    a, b, turn = a[some], b[some], turn[some]
+    long = np.minimum(np.minimum(radius * np.tan(0.5 * turn), LONGEST * radius),
+                      PART * np.minimum(f.lengths[a], f.lengths[b]))
+    handle = 4.0 / 3.0 * np.tan(0.25 * turn) * long / np.tan(0.5 * turn)
+    zeta = np.tile(both, (len(number), 1))
+    for e, end in ((a, last[a]), (b, first[b])):
+        zeta[e, end] -= both[end] * long / np.abs(T[e, end])
+    curves = 1 + np.max(f.curves) + np.arange(len(a))
+    arcs = [_arc(f, zeta, *corner) for corner in zip(a, b, last[a], first[b], handle, curves)]
+    return _joined([_trimmed(f, zeta, np.append(a, b), np.append(last[a], first[b]), np.append(
+        long, long)), *arcs], 0.0)
+
+
+def _arc(f, zeta, a, b, last, first, handle, curve):
+    """The arc from the last end of a to the first one of b: a cubic that is tangent to both."""
+    n = f.starts.shape[1]
+    dofs, at = np.unique(np.append(f.dofs[a], f.dofs[b]), return_inverse=True)
+    controls, places = np.zeros((4, len(dofs)), complex), np.zeros(4, complex)
+    for e, end, k, sign in ((a, last, 0, 1.0), (b, first, 3, -1.0)):
+        z, own = zeta[e, end], at[:f.dofs.shape[1]] if e == a else at[f.dofs.shape[1]:]
+        slope = np.append(0.0, np.arange(1.0, n) * z ** np.arange(n - 1.0))
+        size = np.abs(f.starts[e] @ slope)
+        at_end = z ** np.arange(n) + 1j * f.sides[e] * f.offsets[e] / size * slope
+        for row, by in ((k, at_end), (k + int(sign), at_end - (
+                sign * f.sides[e] * handle / size) * slope)):
+            np.add.at(controls[row], own, f.weights[e] @ by)
+            places[row] = f.starts[e] @ by
+    side = f.sides[b if f.spans[b] == 0.0 else a]  # that of the end of a beam
+    nodes = gauss_lobatto(4)
+    s = 0.5 - 0.5 * side * nodes
+    fit = np.linalg.inv(np.vander(nodes, increasing=True)) @ np.column_stack(
+        [(1.0 - s)**3, 3.0 * s * (1.0 - s)**2, 3.0 * s * s * (1.0 - s), s**3])
+    e = b if f.spans[b] == 0.0 else a
+    return Facets(
+        dofs[None], np.pad((fit @ controls).T, ((0, 0), (0, n - 4)))[None],
+        np.pad(fit @ places, (0, n - 4))[None], sides=np.array([side]), offsets=np.zeros(1),
+        members=f.members[[e]], chains=f.chains[[e]], curves=np.array([curve]),
+        places=f.places[[e]], lengths=np.array([np.abs(places[3] - places[0])]),
+        spans=np.zeros(1), heights=f.heights[[e]], firmness=f.firmness[[e]],
+        ends=np.array([[-2.0, 2.0]]), of=np.zeros(0, int), zeta=np.zeros(0), areas=np.zeros(0))
+
+
+def _trimmed(f, zeta, e, end, long):
+    """Facets between two zeta (F, 2), with points at the corners: ends of e, cut by long."""
+    n, F = f.starts.shape[1], len(f.sides)
+    middle, half = 0.5 * (zeta[:, 1] + zeta[:, 0]), 0.5 * (zeta[:, 1] - zeta[:, 0])
+    nodes, cut = gauss_lobatto(n), half < 1.0
+    old = np.vander((middle[cut, None] + half[cut, None] * nodes).ravel(), n, increasing=True)
+    by = np.linalg.inv(np.vander(nodes, increasing=True)) @ old.reshape(-1, n, n)
+    weights, starts, ends = f.weights.copy(), f.starts.copy(), f.ends.copy()
+    weights[cut] = weights[cut] @ by.transpose(0, 2, 1)
+    starts[cut] = (by @ starts[cut][..., None])[..., 0]
+    ends[cut] = np.where(zeta[cut] == ends[cut], ends[cut], (
+        ends[cut] - middle[cut, None]) / half[cut, None])
+    widths = np.bincount(f.of, f.areas, F) / f.lengths
+    return f._replace(
+        weights=weights, starts=starts, ends=ends, lengths=half * f.lengths, spans=half * f.spans,
+        places=f.places + 0.5 * (1.0 + zeta[:, 0]) * f.spans, of=np.append(f.of, e),
+        zeta=np.append(f.zeta, ends[e, end]), areas=np.append(half[f.of] * f.areas,
+                                                              widths[e] * long))
 
 
 def _of_beam(beam):

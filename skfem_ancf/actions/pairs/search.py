@@ -13,7 +13,7 @@ import scipy
 from ...core import Array
 from ...core.callbacks import handle_of
 from ...core.words import Words
-from ..contact.pairs import (APART, Candidates, PairTables, cross, dot, facing,
+from ..contact.pairs import (APART, EDGE, ON, Candidates, PairTables, cross, dot, facing,
                              together)
 from ..contact.tables import weights_of_motion
 from .facets import Facets
@@ -101,7 +101,9 @@ class Search:
         self.tables = PairTables(
             used=np.arange(n), dofs=_packed(f.dofs.T, np.int64),
             weights=_packed(f.weights.transpose(1, 2, 0), complex),
-            starts=_packed(f.starts.T, complex), near=self._near,
+            starts=_packed(f.starts.T, complex), near=self._near, reach=_packed(
+                f.ends.clip(-1.0, 1.0).T * (1.0 + np.where(np.abs(f.ends) == 1.0, EDGE, ON).T),
+                float),
             joined=_packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
             point_dofs=_packed(surfaces.dofs.T, np.int64), N=_packed(N.T, complex),
             D=_packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
@@ -147,8 +149,10 @@ class Search:
         p, k = p[order], k[order]
         first = np.append(True, (np.diff(p) != 0) | (np.diff(e[k]) != 0))[:len(p)]
         p, k = p[first], k[first]
+        chain = f.chains[e[k]]
+        group = np.unique(p * (1 + np.max(chain, initial=0)) + chain, return_inverse=True)[1]
         return Candidates(*(_packed(x, y) for x, y in (
-            (p, np.int64), (e[k], np.int64), (zeta[k], float))))
+            (p, np.int64), (e[k], np.int64), (zeta[k], float), (group.ravel(), np.int64))))
 
     # parts that are one body
 
@@ -161,8 +165,8 @@ class Search:
         """Ends (n, 2) of short segments of the axes of beams, their chains, places and members."""
         f = self.surfaces.facets
         bottom, top = (np.flatnonzero((f.spans > 0.0) & (f.sides == side)) for side in (-1, 1))
-        n, zeta = parts + 1, np.linspace(-1.0, 1.0, parts + 1)
-        e, at = np.repeat(bottom, n), np.tile(zeta, len(bottom))
+        n = parts + 1
+        e, at = np.repeat(bottom, n), np.linspace(*f.ends[bottom].T, n).T.ravel()
         x = 0.5 * (self.surfaces.along(e, at, 0, z) + self.surfaces.along(
             np.repeat(top, n), at, 0, z)).reshape(-1, n)
         s = self._along(e, at).reshape(-1, n)
