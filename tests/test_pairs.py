@@ -365,6 +365,27 @@ def test_a_motion_with_contact_goes_on_from_a_checkpoint(tmp_path):
         assert np.array_equal(one.integrate(0.004, 4e-4).u, whole.u[:11])
 
 
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_compiled_motions_are_those_of_numpy(monkeypatch, needs_compiled, scheme, friction):
+    """Leaves that rub beside a floor; also of a scene whose obstacle alone has a history."""
+    found = []
+    for mode in ("0", "1"):
+        monkeypatch.setenv("SKFEM_ANCF_COMPILED", mode)
+        leaves = [line(0.5, 6, 0.01, (0.0, -0.0102 * k), ElementBeamANCF(2), RUBBER)
+                  for k in range(2)]
+        scene = Scene(*leaves).contact("all", friction=friction).clamp("left", 0).clamp("left", 1)
+        scene.obstacle(Line((0.0, -0.02), (0.0, 1.0)), friction=0.2).gravity((0.0, -9.81))
+        alone = Scene(leaves[0]).obstacle(Line((0.0, -0.0052), (0.0, 1.0)), friction=0.2)
+        for one in (scene, alone.gravity((0.0, -9.81))):
+            history = one.integrate(0.02, 5e-4, scheme=scheme)
+            found.append((history.u, history.v))
+            assert one.system.backend.choose("steps").way == ("loaded" if mode == "1" else "plain")
+    for numpy, compiled in zip(found[:2], found[2:]):
+        for a, b in zip(numpy, compiled):
+            assert_allclose(b, a, rtol=0, atol=1e-9 * np.abs(a).max())
+
+
 def test_what_does_not_fit_is_said():
     scene = Scene(line(1.0, 4, 0.01), line(1.0, 4, 0.01, (0.0, -0.007)))
     with pytest.raises(InputError, match="overlap by"):

@@ -4,8 +4,9 @@ compares the gap of the middle of each element with the radius of its points."""
 import numpy as np
 
 from ...core import indices, source
-from .gap import distances, middles, places, surface
-from .tables import (ELEMENTS, FRICTION, GAP, LARGEST, MULTIPLIER, RADIUS, RATE, SETTLE, hardening)
+from .gap import Placed, distances, middles, outside, placed
+from .tables import (ELEMENTS, FRICTION, LARGEST, MULTIPLIER, OFFSET, RADIUS, RATE, SETTLE,
+                     hardening)
 
 #: Largest distance at which anchors follow points in a motion, in radii of an element.
 BEYOND = 4.0
@@ -39,12 +40,21 @@ def near_points(pair, what, begin, end):
 
 @source
 def project(pair, which, u, at):
-    """Position and slope (4, n) of points, their surface points (2, n), and their gaps."""
-    rows = np.empty((12, at.size))
-    places(pair, u, 1.0, at, rows[:4])
-    surface(pair, at, rows[:4], rows[4:6])
-    distances(pair, which, False, rows[4:6], rows[GAP:])
-    return rows[:GAP + 1]
+    """The :class:`~skfem_ancf.actions.contact.gap.Placed` of points."""
+    x, t = placed(pair, u, 1.0, at)
+    n = at.size
+    surface, rows = np.empty(n, np.complex128), np.empty((8, n))
+    for i in indices(n):
+        surface[i] = outside(x[i], t[i], pair.points[OFFSET, at[i]])
+        rows[0, i], rows[1, i] = surface[i].real, surface[i].imag
+    distances(pair, which, False, rows[:2], rows[2:])
+    return Placed(x, t, surface, rows[2])
+
+
+@source
+def selected(points, some):
+    """Some of the points."""
+    return Placed(points.x[some], points.t[some], points.surface[some], points.gap[some])
 
 
 @source
@@ -52,7 +62,7 @@ def touching(pair, a, b, at):
     """Active set: the points that touch at one of two states."""
     part, flags, multiplier = 1.0 / hardening(pair), np.empty(at.size), pair.memory[MULTIPLIER]
     for i in indices(at.size):
-        flags[i] = 1.0 * (np.minimum(a[GAP, i], b[GAP, i]) < part * multiplier[at[i]])
+        flags[i] = 1.0 * (np.minimum(a.gap[i], b.gap[i]) < part * multiplier[at[i]])
     return np.nonzero(flags)[0]
 
 

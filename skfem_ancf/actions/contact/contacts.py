@@ -15,12 +15,11 @@ from ...core.callbacks import handle_of
 from ...core import Array, InputError, refuse, shown
 from .active_set import BEYOND, project
 from .crossing import CrossingGuard, middle_of
-from .gap import TINY, places
-from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of_contacts,
-                      of_pair, press, damp, states, surface_velocities, untouched)
+from .gap import TINY, placed
+from .kernels import damp, of_contacts, of_pair, respond, touch_of, untouched
 from .laws import mean_pressure, pressure_slope
 from .poses import carried, taken_back
-from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
+from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, HEADER, LARGEST, NOW,
                      NUMBERS, POSE, POSES, PRESSURES, RADIUS, RATE, SETTLE, STIFFNESS, TANGENT,
                      TOLERANCE, TURNS, ContactTables, Pair, Request, SEEN as SEEN_AT, clear_table,
                      pair_of, set_clear, transition, weights_of_motion)
@@ -369,7 +368,7 @@ class Contacts:
         for k, group in enumerate(self.groups):
             pair, at = self.pair(k), np.arange(len(group[1].first))
             found = project(pair, NOW, u, at)
-            out.append((group, found[4:GAP], found[GAP]))
+            out.append((group, np.array([found.surface.real, found.surface.imag]), found.gap))
         return out
 
     def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
@@ -380,18 +379,16 @@ class Contacts:
         out = []
         for k, (which, group) in enumerate(self.groups):
             pair, at = self.pair(k), np.arange(len(group.first))
-            w, found = np.zeros((ROWS, at.size)), project(pair, NOW, u, at)
-            states(pair, True, found, found, at, w)
-            press(pair, at, w)
-            add_friction(pair, True, at, w)
-            force, pressure = -w[PUSH:PUSH + 2], w[PRESSURE] / group.areas
+            found, K, rest = project(pair, NOW, u, at), np.empty((4, at.size)), np.empty(at.size)
+            force, damping, pressure = 0j * found.x, 0j * found.x, np.empty(at.size)
+            touch = touch_of(pair, True, found, found, at)
+            respond(pair, True, touch, force, rest, K, pressure)
             if v is not None and group.numbers[DAMPING] > 0.0:
-                places(pair, v, 0.0, at, w[RATES:DEPTH])
-                surface_velocities(w)
-                damp(pair, 0.0, at, w)
-                force = force - w[PUSH:PUSH + 2]
-            out.append((which, w[LAST:LAST + 2] + self.origin[:, None], force, pressure,
-                        found[GAP]))
+                moved, turns = placed(pair, v, 0.0, at)
+                damp(pair, 0.0, touch, moved, turns, damping, K)
+            force += damping
+            out.append((which, touch.place + self.origin[:, None], -np.array(
+                [force.real, force.imag]), pressure / group.areas, found.gap))
         return out
 
     def slipping(self, u: Array, t: float) -> list[Any]:

@@ -3,11 +3,14 @@
 a distance c. The gap is negative inside the obstacle; its gradient is the normal at the closest
 point."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...core.callbacks import custom_distance
-from ...core import F1, F2, I1, apart, indices, source
-from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIR, PAIRS, RADIUS, SIDE, START, TINY
+from ...core import C1, F1, F2, apart, indices, source
+from .plane import dot, scaled, turned, vector
+from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, PAIR, PAIRS, RADIUS, SIDE, START, TINY
 
 #: The least square of a slope: sections have none, and levers of no length.
 SHORT = 1e-30
@@ -15,26 +18,31 @@ SHORT = 1e-30
 DISC = 5
 
 
+class Placed(NamedTuple):
+    """Points on the axis, slopes there, and surface points, (n,), with their gaps."""
+
+    x: C1
+    t: C1
+    surface: C1
+    gap: F1
+
+
 @source
-def _interpolate(weights, first, u, at, p, q):
-    """Add displacements of both components at points."""
-    for k in range(weights.shape[0]):
-        row = weights[k]
-        for i in indices(at.size):
-            dof, w = first[at[i]] + 2 * k, row[at[i]]
-            p[i] += w * u[dof]
-            q[i] += w * u[dof + 1]
-
-
-@apart("contacts", PAIR, F1, float, I1, F2)
-def places(pair, u, factor, at, z):
-    """Positions and slopes (4, n) of points: factor times the reference ones plus displacements."""
-    for c in range(4):
-        row = pair.points[START + c]
-        for i in indices(at.size):
-            z[c, i] = factor * row[at[i]]
-    _interpolate(pair.weights, pair.first, u, at, z[0], z[1])
-    _interpolate(pair.slopes, pair.first, u, at, z[2], z[3])
+def placed(pair, u, factor, at):
+    """Positions and slopes of points: factor times the reference ones plus displacements."""
+    n, z = at.size, u.view(np.complex128)
+    x, t, start = np.empty(n, np.complex128), np.empty(n, np.complex128), pair.points[START:]
+    for i in indices(n):
+        m = at[i]
+        x[i] = scaled(factor, vector(start[0, m], start[1, m]))
+        t[i] = scaled(factor, vector(start[2, m], start[3, m]))
+    for k in range(pair.weights.shape[0]):
+        for i in indices(n):
+            x[i] += scaled(pair.weights[k, at[i]], z[pair.first[at[i]] // 2 + k])
+    for k in range(pair.slopes.shape[0]):
+        for i in indices(n):
+            t[i] += scaled(pair.slopes[k, at[i]], z[pair.first[at[i]] // 2 + k])
+    return x, t
 
 
 @apart("contacts", PAIR, F1, float, F2, F1)
@@ -57,35 +65,19 @@ def middles(pair, u, factor, x, radius):
             radius[e] += q[e] * np.sqrt(c * c + d * d)
 
 
-@apart("contacts", PAIR, I1, F2, F2)
-def surface(pair, at, z, x):
-    """Surface points (2, n) from positions and slopes."""
-    offset = pair.points[OFFSET]
-    for i in indices(at.size):
-        s, t = z[2, i], z[3, i]
-        c = offset[at[i]] / np.sqrt(np.maximum(s * s + t * t, SHORT))
-        x[0, i], x[1, i] = z[0, i] - c * t, z[1, i] + c * s
-
-
-@apart("contacts", PAIR, I1, F2, F2)
-def levers(pair, at, z, lever):
-    """Derivative of the surface point by the slope: xs, xt, ys, yt."""
-    offset = pair.points[OFFSET]
-    for i in indices(at.size):
-        s, t = z[2, i], z[3, i]
-        square = np.maximum(s * s + t * t, SHORT)
-        c = offset[at[i]] / square / np.sqrt(square)
-        lever[0, i], lever[1, i] = c * s * t, -c * s * s
-        lever[2, i], lever[3, i] = c * t * t, -c * s * t
+@source
+def outside(x, t, offset):
+    """Surface points beside points x of an axis with the slope t."""
+    return x + scaled(offset / np.sqrt(np.maximum(dot(t, t), SHORT)), turned(t))
 
 
 @source
-def carried(q, p, x, y):
+def carried(q, p, x):
     """Points that move with an obstacle from pose p to pose q."""
     # x + (turn - 1) (x - pivot): a pivot far away adds no round-off
     cos, sin = q[2] * p[2] + q[3] * p[3] - 1.0, q[3] * p[2] - q[2] * p[3]
-    a, b = x - p[0] - p[4], y - p[1] - p[5]
-    return x + (q[0] - p[0]) + cos * a - sin * b, y + (q[1] - p[1]) + sin * a + cos * b
+    a, b = x.real - p[0] - p[4], x.imag - p[1] - p[5]
+    return x + vector(q[0] - p[0] + cos * a - sin * b, q[1] - p[1] + sin * a + cos * b)
 
 
 @apart("contacts", PAIR, int, bool, F2, F2)

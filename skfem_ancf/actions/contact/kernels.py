@@ -10,19 +10,20 @@ In a motion the stiffness is at least ``INERTIA`` times the mass over the square
 updates of multipliers are needed.
 """
 
-from typing import Annotated
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...core.band import smallest
-from ...core import F1, F2, I1, MADE, apart, indices, source
+from ...core import C1, F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
-from .active_set import near_points, project, search, relative_travel, touching
-from .gap import SHORT, TINY, carried, distances, levers, places, surface
+from .active_set import near_points, project, relative_travel, search, selected, touching
+from .gap import SHORT, TINY, carried, distances, outside, placed
 from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_slope,
                    return_mapping, slip_of)
+from .plane import cross, dot, scaled, turned, vector
 from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, ANCHORS, AREA, AUGMENT, BEGIN, BILATERAL,
-                     DAMPED_TANGENT, DAMPING, END, FOLLOWED, FORCE, FRICTION, GAP, LARGEST,
+                     DAMPED_TANGENT, DAMPING, END, FOLLOWED, FORCE, FRICTION, LARGEST,
                      MULTIPLIER, NOW, OFFSET, PAIR, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING,
                      STIFFNESS, TOLERANCE, ContactTables, Request, hardening, is_clear, pair_of,
                      set_clear, transition)
@@ -34,13 +35,24 @@ FAR = 1e300
 #: Anchors of slipped points are inside of the limit by these parts of it and of an element, so that
 #: they stick at the start of the next step whatever the last digit.
 INSIDE, NOWHERE = 1e-9, 1e-14
-#: Rows of active points: position and slope in the middle of a mean; their displacement, or
-#: velocity; penetration at both ends; surface point at the end; its displacement, or velocity;
-#: surface point in the middle, its gap with derivatives, and its derivative by the slope; force and
-#: its derivative; pressure and its derivative; missing work over the squared displacement.
-(MIDDLE, RATES, DEPTH, LAST, WAY, PLACE, FOUND, LEVER, PUSH, K, PRESSURE, SLOPE, MISSING,
- ROWS) = 0, 4, 8, 10, 12, 14, 16, 22, 26, 28, 32, 33, 34, 35
-NX, NY = FOUND + 1, FOUND + 2
+
+
+class Touch(NamedTuple):
+    """Points in contact between two states, (n,); plane vectors are complex numbers."""
+
+    at: I1
+    slope: C1  # of the axis, in the middle
+    moved: C1  # displacement of the place on it, and change of the slope
+    turns: C1
+    before: F1  # penetrations
+    after: F1
+    last: C1  # surface point at the end
+    place: F2  # and in the middle, (2, n)
+    normal: C1  # gradient of the gap there
+    bend: F2  # and its second derivatives xx, xy, yy, (3, n)
+
+
+TOUCH: TypeAlias = Annotated[Touch, MADE]
 
 
 @apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
@@ -89,120 +101,114 @@ def of_pair(pair, request, u, v, out, least):
     a = project(pair, NOW if same else BEGIN, u, at)
     b = a if same else project(pair, END, v, at)
     if what == FORCE:
-        least[0] = min(least[0], smallest(b[GAP]))
+        least[0] = min(least[0], smallest(b.gap))
     if what < SETTLE:
         some = touching(pair, a, b, at)
-        at, a, b = at[some], a[:, some], b[:, some]
+        at = at[some]
+        a, b = selected(a, some), selected(b, some)
     if at.size == 0:
         return
-    w = np.empty((ROWS, at.size))
-    states(pair, same, a, b, at, w)
+    p = touch_of(pair, same, a, b, at)
     if what == AUGMENT:
-        _augment(pair, at, w, out)
+        _augment(pair, at, p.before, out)
         return
+    force, missing, K, pressure = np.empty(at.size, np.complex128), np.zeros(at.size), np.empty(
+        (4, at.size)), np.empty(at.size)
+    moved, turns = p.moved, p.turns
     if resists or what == ALONG:
-        places(pair, v, 0.0, at, w[RATES:DEPTH])
-        surface_velocities(w)
+        moved, turns = placed(pair, v, 0.0, at)
     if resists:
-        damp(pair, request.factor, at, w)
+        damp(pair, request.factor, p, moved, turns, force, K)
     else:
-        press(pair, at, w)
-        if what == FORCE:
-            _keep_work(pair, w)
-        if what == SETTLE:
-            _settle(pair, same, at, w, out)
-            return
-        add_friction(pair, same, at, w)
-    if what == FORCE or what == RESISTING:
-        _add_force(pair, at, w, out)
+        respond(pair, same, p, force, missing, K, pressure)
+    if what == SETTLE:
+        _settle(pair, same, p, pressure, out)
+    elif what == FORCE or what == RESISTING:
+        _add_force(pair, p, force, missing, out)
     else:
         S = np.zeros((16, at.size))
-        _stiffness(pair, at, w, S)
+        _stiffness(pair, p, force, K, S)
         if what == ALONG:
-            _add_along(w, S, out)
+            _add_along(moved, turns, S, out)
         else:
             _add_stiffness(pair, request, at, S, out)
 
 
-@apart("contacts", PAIR, bool, F2, F2, I1, F2)
-def states(pair, same, a, b, at, w):
-    """Fill the rows of points up to the derivative by the slope."""
-    part, multiplier = 1.0 / hardening(pair), pair.memory[MULTIPLIER]
-    for c in range(4):
-        for i in indices(at.size):
-            w[RATES + c, i] = b[c, i] - a[c, i]
-            w[MIDDLE + c, i] = a[c, i]
-    for i in indices(at.size):
-        more = part * multiplier[at[i]]
-        w[DEPTH, i], w[DEPTH + 1, i] = more - a[GAP, i], more - b[GAP, i]
-        w[LAST, i], w[LAST + 1, i] = b[4, i], b[5, i]
-    if not same and pair.moving > 0:
-        _carry(pair, a, w)
-    if not same:
-        for c in range(4):
-            for i in indices(at.size):
-                w[MIDDLE + c, i] += 0.5 * w[RATES + c, i]
-    surface(pair, at, w[MIDDLE:RATES], w[PLACE:FOUND])
-    levers(pair, at, w[MIDDLE:RATES], w[LEVER:PUSH])
-    distances(pair, NOW, True, w[PLACE:FOUND], w[FOUND:LEVER])
-    surface_velocities(w)
+@source
+def touch_of(pair, same, a, b, at):
+    """The :class:`Touch` between two states of points, which may be one."""
+    n, part, poses = at.size, 1.0 / hardening(pair), pair.poses
+    moved, turns, slope, last = (np.empty(n, np.complex128), np.empty(n, np.complex128),
+                                 np.empty(n, np.complex128), np.empty(n, np.complex128))
+    before, after, x, found, normal = np.empty(n), np.empty(n), np.empty((2, n)), np.empty(
+        (6, n)), np.empty(n, np.complex128)
+    for i in indices(n):
+        x0, x1, end = a.x[i], b.x[i], b.surface[i]
+        if not same and pair.moving > 0:  # with the obstacle to its middle pose
+            x0 = x0 + carried(poses[NOW], poses[BEGIN], a.surface[i]) - a.surface[i]
+            there = carried(poses[NOW], poses[END], end)
+            x1, end = x1 + there - end, there
+        more = part * pair.memory[MULTIPLIER, at[i]]
+        before[i], after[i], last[i] = more - a.gap[i], more - b.gap[i], end
+        moved[i], turns[i], slope[i] = x1 - x0, b.t[i] - a.t[i], scaled(0.5, a.t[i] + b.t[i])
+        middle = outside(scaled(0.5, x0 + x1), slope[i], pair.points[OFFSET, at[i]])
+        x[0, i], x[1, i] = middle.real, middle.imag
+    distances(pair, NOW, True, x, found)
+    for i in indices(n):
+        normal[i] = vector(found[1, i], found[2, i])
+    return Touch(at, slope, moved, turns, before, after, last, x, normal, found[3:])
 
 
 @source
-def _carry(pair, a, w):
-    """Move points with the obstacle to its middle pose."""
-    for i in indices(w.shape[1]):
-        x, y = carried(pair.poses[NOW], pair.poses[BEGIN], a[4, i], a[5, i])
-        p, q = x - a[4, i], y - a[5, i]
-        x, y = carried(pair.poses[NOW], pair.poses[END], w[LAST, i], w[LAST + 1, i])
-        w[MIDDLE, i] += p
-        w[MIDDLE + 1, i] += q
-        w[RATES, i] += x - w[LAST, i] - p
-        w[RATES + 1, i] += y - w[LAST + 1, i] - q
-        w[LAST, i], w[LAST + 1, i] = x, y
-
-
-@source
-def surface_velocities(w):
-    """Velocities of surface points from those of positions and slopes."""
-    for k in range(2):
-        for i in indices(w.shape[1]):
-            w[WAY + k, i] = (w[RATES + k, i] + w[LEVER + 2 * k, i] * w[RATES + 2, i]
-                             + w[LEVER + 2 * k + 1, i] * w[RATES + 3, i])
+def lever(pair, p, i):
+    """u and a of the derivative ``-u (a . dt)`` of surface points by their slope t."""
+    t, c = p.slope[i], pair.points[OFFSET, p.at[i]]
+    short = 1.0 / np.sqrt(np.maximum(dot(t, t), SHORT))
+    unit = scaled(short, t)
+    return scaled(c * short, unit), turned(unit)
 
 
 # laws
 
 
-@apart("contacts", PAIR, I1, F2)
-def press(pair, at, w):
-    """Force of the pressure, and its derivative."""
-    area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], transition(pair)
-    part = hardening(pair)
-    stiffness, holds = pair.numbers[STIFFNESS] * part, pair.common[BILATERAL] / part
-    for i in indices(at.size):
-        a, b, scale, pulls = w[DEPTH, i], w[DEPTH + 1, i], stiffness * area[at[i]], holds * (
-            multiplier[at[i]])
-        mean = mean_pressure(a, b, width) - pulls
-        p, c = scale * mean, scale * mean_pressure_slope(a, b, width, mean)
-        x, y = w[NX, i], w[NY, i]
-        w[PUSH, i], w[PUSH + 1, i], w[PRESSURE, i], w[SLOPE, i] = -p * x, -p * y, p, c
-        w[MISSING, i] = 0.0
-        w[K, i], w[K + 3, i] = c * x * x - p * w[FOUND + 3, i], c * y * y - p * w[FOUND + 5, i]
-        w[K + 1, i] = c * x * y - p * w[FOUND + 4, i]
-        w[K + 2, i] = w[K + 1, i]
+@apart("contacts", PAIR, bool, TOUCH, C1, F1, F2, F1)
+def respond(pair, same, p, force, missing, K, pressure):
+    """Set resisting forces of pressure and Coulomb friction, their derivatives, and pressures.
 
-
-@source
-def _keep_work(pair, w):
-    """Correct forces such that their work is the change of the potential."""
-    close = (CLOSE * pair.numbers[RADIUS]) ** 2
-    for i in indices(w.shape[1]):
-        square = (w[RATES, i] * w[RATES, i] + w[RATES + 1, i] * w[RATES + 1, i]
-                  + w[RATES + 2, i] * w[RATES + 2, i] + w[RATES + 3, i] * w[RATES + 3, i])
-        missing = (w[PRESSURE, i] * (w[DEPTH + 1, i] - w[DEPTH, i])
-                   - w[PUSH, i] * w[WAY, i] - w[PUSH + 1, i] * w[WAY + 1, i])
-        w[MISSING, i] = missing * (square > close) / np.maximum(square, TINY)
+    ``missing`` is the difference of the work of the pressure from the change of its potential, over
+    the squared displacement.
+    """
+    width, part, memory = transition(pair), hardening(pair), pair.memory
+    holds = pair.common[BILATERAL] / part
+    close, (friction, all_stick, sticking) = (CLOSE * pair.numbers[RADIUS]) ** 2, _tangential(pair)
+    # damps vibrations on the springs; a mean does so by itself
+    extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
+    for i in indices(pressure.size):
+        m, n = p.at[i], p.normal[i]
+        a, b, area = p.before[i], p.after[i], pair.points[AREA, m]
+        scale = pair.numbers[STIFFNESS] * part * area
+        mean = mean_pressure(a, b, width) - holds * memory[MULTIPLIER, m]
+        P, c = scale * mean, scale * mean_pressure_slope(a, b, width, mean)
+        u, across = lever(pair, p, i)
+        way = p.moved[i] - scaled(dot(across, p.turns[i]), u)
+        square = dot(p.moved[i], p.moved[i]) + dot(p.turns[i], p.turns[i])
+        missing[i] = P * (b - a + dot(n, way)) * (square > close) / np.maximum(square, TINY)
+        T, stick, change = 0.0, 0.0, 0.0
+        if friction > 0.0:
+            slip = slip_of(pair.poses[NOW], n.real, n.imag, p.last[i].real, p.last[i].imag,
+                           memory[ANCHOR_X, m], memory[ANCHOR_Y, m])
+            k = sticking * area
+            trial = k * (slip + extrapolates * (slip - memory[SLIP, m]))
+            T, sticks = return_mapping(trial, friction * P)
+            sticks = np.maximum(sticks, all_stick)
+            change = friction * np.sign(trial) * (1.0 - sticks) * c
+            stick = (1.0 + extrapolates if same else 2.0) * k * sticks
+        pressure[i], force[i] = P, scaled(-P, n) + scaled(T, turned(n))
+        x, y, xx, xy, yy = n.real, n.imag, p.bend[0, i], p.bend[1, i], p.bend[2, i]
+        K[0, i] = c * x * x - P * xx + stick * y * y + change * x * y - T * xy
+        K[1, i] = (c - stick) * x * y - P * xy + change * y * y - T * yy
+        K[2, i] = (c - stick) * x * y - P * xy - change * x * x + T * xx
+        K[3, i] = c * y * y - P * yy + stick * x * x - change * x * y + T * xy
 
 
 @source
@@ -213,82 +219,58 @@ def _tangential(pair):
             pair.numbers[STICKING] * (1.0 + firmness))
 
 
-@apart("contacts", PAIR, bool, I1, F2)
-def add_friction(pair, same, at, w):
-    """Add Coulomb friction and its derivative."""
-    friction, holds, sticking = _tangential(pair)
-    if friction == 0.0:
-        return
-    area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
-    # damps vibrations on the springs; a mean does so by itself
-    extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
-    for i in indices(at.size):
-        nx, ny = w[NX, i], w[NY, i]
-        slip = slip_of(pose, nx, ny, w[LAST, i], w[LAST + 1, i], memory[ANCHOR_X, at[i]],
-                       memory[ANCHOR_Y, at[i]])
-        k = sticking * area[at[i]]
-        trial = k * (slip + extrapolates * (slip - memory[SLIP, at[i]]))
-        T, sticks = return_mapping(trial, friction * w[PRESSURE, i])
-        sticks = np.maximum(sticks, holds)
-        change = friction * np.sign(trial) * (1.0 - sticks) * w[SLOPE, i]
-        c = (1.0 + extrapolates if same else 2.0) * k * sticks
-        w[PUSH, i] -= T * ny
-        w[PUSH + 1, i] += T * nx
-        w[K, i] += c * ny * ny + change * ny * nx - T * w[FOUND + 4, i]
-        w[K + 1, i] += change * ny * ny - c * nx * ny - T * w[FOUND + 5, i]
-        w[K + 2, i] += T * w[FOUND + 3, i] - c * nx * ny - change * nx * nx
-        w[K + 3, i] += c * nx * nx - change * nx * ny + T * w[FOUND + 4, i]
-
-
-@apart("contacts", PAIR, float, I1, F2)
-def damp(pair, factor, at, w):
-    """Damping force proportional to the pressure, and its derivative."""
-    area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
-    stiffness, width = pair.numbers[STIFFNESS] * hardening(pair), transition(pair)
-    for i in indices(at.size):
-        k, a, nx, ny = stiffness * area[at[i]], w[DEPTH, i], w[NX, i], w[NY, i]
-        loss = damping_loss(pose, damping, nx, ny, w[PLACE, i], w[PLACE + 1, i], w[WAY, i],
-                            w[WAY + 1, i])
-        p = k * mean_pressure(a, a, width)
-        c = factor * p * damping * (loss < 1.0) - loss * k * pressure_slope(a, width)
-        w[PUSH, i], w[PUSH + 1, i], w[MISSING, i] = p * loss * nx, p * loss * ny, 0.0
-        w[K, i], w[K + 1, i] = c * nx * nx, c * nx * ny
-        w[K + 2, i], w[K + 3, i] = c * ny * nx, c * ny * ny
+@apart("contacts", PAIR, float, TOUCH, C1, C1, C1, F2)
+def damp(pair, factor, p, moved, turns, force, K):
+    """Set damping forces proportional to the pressure at a velocity, and their derivatives."""
+    damping, width = pair.numbers[DAMPING], transition(pair)
+    for i in indices(force.size):
+        k = pair.numbers[STIFFNESS] * hardening(pair) * pair.points[AREA, p.at[i]]
+        n, (u, across) = p.normal[i], lever(pair, p, i)
+        way = moved[i] - scaled(dot(across, turns[i]), u)
+        loss = damping_loss(pair.poses[NOW], damping, n.real, n.imag, p.place[0, i],
+                            p.place[1, i], way.real, way.imag)
+        P = k * mean_pressure(p.before[i], p.before[i], width)
+        c = factor * P * damping * (loss < 1.0) - loss * k * pressure_slope(p.before[i], width)
+        force[i] = scaled(P * loss, n)
+        K[0, i], K[1, i] = c * n.real * n.real, c * n.real * n.imag
+        K[2, i], K[3, i] = c * n.imag * n.real, c * n.imag * n.imag
 
 
 # history data
 
 
-@apart("contacts", PAIR, bool, I1, F2, F1)
-def _settle(pair, same, at, w, out):
+@apart("contacts", PAIR, bool, TOUCH, F1, F1)
+def _settle(pair, same, p, pressure, out):
     """Move anchors of slipping points to the limit of sticking; add the work to ``out[0]``."""
     friction, _, sticking = _tangential(pair)
-    area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
-    augmented, lost, where = pair.numbers[TOLERANCE] > 0.0, np.empty(at.size), 0 * at
-    for i in indices(at.size):
-        nx, ny, x, y = w[NX, i], w[NY, i], w[LAST, i], w[LAST + 1, i]
-        slip = slip_of(pose, nx, ny, x, y, memory[ANCHOR_X, at[i]], memory[ANCHOR_Y, at[i]])
-        k, limit, gone = sticking * area[at[i]], friction * w[PRESSURE, i], w[WAY + 1, i] * nx - (
-            w[WAY, i] * ny)
+    pose, memory = pair.poses[NOW], pair.memory
+    augmented, lost = pair.numbers[TOLERANCE] > 0.0, np.empty(pressure.size)
+    extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
+    for i in indices(lost.size):
+        m, n, last = p.at[i], p.normal[i], p.last[i]
+        slip = slip_of(pose, n.real, n.imag, last.real, last.imag, memory[ANCHOR_X, m],
+                       memory[ANCHOR_Y, m])
+        k, limit, (u, across) = sticking * pair.points[AREA, m], friction * pressure[i], lever(
+            pair, p, i)
+        gone = cross(n, p.moved[i] - scaled(dot(across, p.turns[i]), u))
         if same:
-            gone = slip - memory[SLIP, at[i]]
-        extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
+            gone = slip - memory[SLIP, m]
         T, _ = return_mapping(k * (slip + extrapolates * gone), limit)
         after, _ = return_mapping(slip, np.maximum(
             (1.0 - INSIDE) * limit / k - NOWHERE * pair.numbers[RADIUS], 0.0))
         lost[i] = T * gone
         if augmented:
-            lost[i] += w[PRESSURE, i] * (w[DEPTH + 1, i] - w[DEPTH, i])
-        x, y = x + after * ny - pose[0], y - after * nx - pose[1]
+            lost[i] += pressure[i] * (p.after[i] - p.before[i])
+        x, y = last.real + after * n.imag - pose[0], last.imag - after * n.real - pose[1]
         a, b, cos, sin = x - pose[4], y - pose[5], pose[2] - 1.0, pose[3]
-        memory[SLIP, at[i]] = after
-        memory[ANCHOR_X, at[i]] = x + cos * a + sin * b
-        memory[ANCHOR_Y, at[i]] = y + cos * b - sin * a
-    add_each(out, where, lost)
+        memory[SLIP, m] = after
+        memory[ANCHOR_X, m] = x + cos * a + sin * b
+        memory[ANCHOR_Y, m] = y + cos * b - sin * a
+    add_each(out, 0 * p.at, lost)
 
 
-@apart("contacts", PAIR, I1, F2, F1)
-def _augment(pair, at, w, out):
+@apart("contacts", PAIR, I1, F1, F1)
+def _augment(pair, at, depth, out):
     """Increase multipliers by penetrations, decrease them by gaps, beyond the tolerance."""
     tolerance, multiplier = pair.numbers[TOLERANCE], pair.memory[MULTIPLIER]
     if tolerance == 0.0:
@@ -297,7 +279,7 @@ def _augment(pair, at, w, out):
     k = hardening(pair)
     for i in indices(at.size):
         before = multiplier[at[i]] / k
-        change = np.maximum(w[DEPTH, i], 0.0) - before
+        change = np.maximum(depth[i], 0.0) - before
         far[i] = 1.0 * (np.abs(change) > tolerance)
         after = k * (before + far[i] * change)
         multiplier[at[i]] = after
@@ -312,69 +294,65 @@ def _augment(pair, at, w, out):
 # from points to degrees of freedom
 
 
-@apart("contacts", PAIR, I1, F2, F1)
-def _add_force(pair, at, w, out):
+@apart("contacts", PAIR, TOUCH, C1, F1, F1)
+def _add_force(pair, p, force, missing, out):
     """Add forces on surface points to those on degrees of freedom."""
-    value, turn, where = np.empty(at.size), np.empty(at.size), pair.first[at]
-    for c in range(2):
-        for i in indices(at.size):
-            turn[i] = (w[LEVER + c, i] * w[PUSH, i] + w[LEVER + 2 + c, i] * w[PUSH + 1, i]
-                       + w[MISSING, i] * w[RATES + 2 + c, i])
-        for a in range(pair.weights.shape[0]):
-            row = pair.weights[a]
-            for i in indices(at.size):
-                value[i] = row[at[i]] * (w[PUSH + c, i] + w[MISSING, i] * w[RATES + c, i])
-            if pair.slopes.shape[0] > 0:
-                row = pair.slopes[a]
-                for i in indices(at.size):
-                    value[i] += row[at[i]] * turn[i]
-            add_each(out[2 * a + c:], where, value)
+    n = force.size
+    turn, value, where = np.empty(n, np.complex128), np.empty(n, np.complex128), (
+        pair.first[p.at] // 2)
+    for i in indices(n):
+        u, across = lever(pair, p, i)
+        turn[i] = scaled(missing[i], p.turns[i]) - scaled(dot(u, force[i]), across)
+        force[i] += scaled(missing[i], p.moved[i])
+    for a in range(pair.weights.shape[0]):
+        row = pair.weights[a]
+        for i in indices(n):
+            value[i] = scaled(row[p.at[i]], force[i])
+        if pair.slopes.shape[0] > 0:
+            row = pair.slopes[a]
+            for i in indices(n):
+                value[i] += scaled(row[p.at[i]], turn[i])
+        add_each(out.view(np.complex128)[a:], where, value)
 
 
-@apart("contacts", PAIR, I1, F2, F2)
-def _stiffness(pair, at, w, S):
+@apart("contacts", PAIR, TOUCH, C1, F2, F2)
+def _stiffness(pair, p, force, K, S):
     """Derivative of the force on position and slope; entry (c, d) in row 4 c + d."""
-    offset = pair.points[OFFSET]
-    for c in range(2):
-        for d in range(2):
-            for i in indices(at.size):
-                S[4 * c + d, i] = w[K + 2 * c + d, i]
-    if pair.slopes.shape[0] == 0:
-        return
-    for c in range(2):
-        for d in range(2):
-            for i in indices(at.size):
-                # K L and L^T K
-                S[4 * c + 2 + d, i] = (w[K + 2 * c, i] * w[LEVER + d, i]
-                                       + w[K + 2 * c + 1, i] * w[LEVER + 2 + d, i])
-                S[4 * (2 + d) + c, i] = (w[LEVER + d, i] * w[K + c, i]
-                                         + w[LEVER + 2 + d, i] * w[K + 2 + c, i])
-    for c in range(2):
-        for d in range(2):
-            for i in indices(at.size):
-                S[4 * (2 + c) + 2 + d, i] = (w[LEVER + c, i] * S[2 + d, i]
-                                             + w[LEVER + 2 + c, i] * S[6 + d, i])
-    for i in indices(at.size):  # and the second derivative of the surface by the slope
-        s, t, p, q = w[MIDDLE + 2, i], w[MIDDLE + 3, i], w[PUSH, i], w[PUSH + 1, i]
-        square = np.maximum(s * s + t * t, SHORT)
-        c = offset[at[i]] / square / square / np.sqrt(square)
-        across, both = -c * (q * s - p * t), c * (p * s + q * t)
-        mixed = both * (s * s - t * t) - across * s * t
-        S[10, i] += across * t * t - 2.0 * both * s * t
+    for i in indices(force.size):
+        u, v = lever(pair, p, i)
+        a, k = (v.real, v.imag), ((K[0, i], K[1, i]), (K[2, i], K[3, i]))
+        left = (k[0][0] * u.real + k[1][0] * u.imag, k[0][1] * u.real + k[1][1] * u.imag)
+        right = (k[0][0] * u.real + k[0][1] * u.imag, k[1][0] * u.real + k[1][1] * u.imag)
+        both = left[0] * u.real + left[1] * u.imag
+        for c in range(2):
+            for d in range(2):
+                S[4 * c + d, i] = k[c][d]
+                S[4 * c + 2 + d, i] = -right[c] * a[d]
+                S[4 * (2 + c) + d, i] = -a[c] * left[d]
+                S[4 * (2 + c) + 2 + d, i] = both * a[c] * a[d]
+        # and the second derivative of the surface by the slope
+        t, f = p.slope[i], force[i]
+        square = np.maximum(dot(t, t), SHORT)
+        c = pair.points[OFFSET, p.at[i]] / square / square / np.sqrt(square)
+        over, along = c * cross(f, t), c * dot(f, t)
+        x, y = t.real, t.imag
+        mixed = along * (x * x - y * y) - over * x * y
+        S[10, i] += over * y * y - 2.0 * along * x * y
         S[11, i] += mixed
         S[14, i] += mixed
-        S[15, i] += across * s * s + 2.0 * both * s * t
+        S[15, i] += over * x * x + 2.0 * along * x * y
 
 
-@apart("contacts", F2, F2, F1)
-def _add_along(w, S, out):
+@apart("contacts", C1, C1, F2, F1)
+def _add_along(moved, turns, S, out):
     """Add the derivative of the work along the velocities to ``out[0]``."""
-    value, where = np.empty(w.shape[1]), np.zeros(w.shape[1], np.int64)
-    for a in range(4):
-        for b in range(4):
-            for i in indices(value.size):
-                value[i] = S[4 * a + b, i] * w[RATES + a, i] * w[RATES + b, i]
-            add_each(out, where, value)
+    value, zero = np.zeros(moved.size), np.zeros(moved.size, np.int64)
+    for i in indices(value.size):
+        rates = (moved[i].real, moved[i].imag, turns[i].real, turns[i].imag)
+        for a in range(4):
+            for b in range(4):
+                value[i] += S[4 * a + b, i] * rates[a] * rates[b]
+    add_each(out, zero, value)
 
 
 @apart("contacts", PAIR, Annotated[Request, MADE], I1, F2, F1)

@@ -20,6 +20,7 @@ from ...core.band import copy, dot as inner, largest, smallest
 from ...core.callbacks import SEARCHES, call_custom, owner
 from ..tables import add_each, least_each
 from .laws import mean_pressure, mean_pressure_slope, return_mapping
+from .plane import cross, dot, scaled, size, turned, vector
 
 #: Iterations of the projection, its largest step along a facet, and how far it may leave it.
 PROJECT, FAR, LEFT = 12, 1.0, 1.5
@@ -131,43 +132,7 @@ def candidates_of(t):
     return owner(t.handle).candidates
 
 
-# plane vectors and curves
-
-
-@source
-def dot(a, b):
-    """The scalar product."""
-    return a.real * b.real + a.imag * b.imag
-
-
-@source
-def cross(a, b):
-    """The product ``a_1 b_2 - a_2 b_1``."""
-    return a.real * b.imag - a.imag * b.real
-
-
-@source
-def size(a):
-    """The length."""
-    return np.sqrt(a.real * a.real + a.imag * a.imag)
-
-
-@source
-def scaled(c, a):
-    """A multiple; Numba would multiply and divide by a complex number."""
-    return vector(c * a.real, c * a.imag)
-
-
-@source
-def turned(a):
-    """A vector turned by a right angle, ``1j a``."""
-    return vector(-a.imag, a.real)
-
-
-@primitive("skfem_ancf.core.loops")
-def vector(x, y):
-    """The vector with two components; Numba would multiply by 1j."""
-    return x + 1j * y
+# curves
 
 
 @source

@@ -40,8 +40,6 @@ ANCHORED, RATE, BILATERAL, LARGEST = range(4)
 #: Flags of history data: anchors, angles of torsional springs, multipliers.
 ANCHORS, TURNS, PRESSURES = 1, 2, 4
 TINY = 1e-200
-#: The row of projections of points that is the gap, behind place and slope and the surface.
-GAP = 6
 
 
 class Request(NamedTuple):
