@@ -383,7 +383,7 @@ def test_an_interrupt_keeps_what_has_converged(monkeypatch):
     whole = scene.solve_static(first_step=0.25)
     for module, name, solve in (
             (Increment, "solve", lambda: scene.solve_static(first_step=0.25)),
-            (continuation, "_step", lambda: scene.continuation(max_load=1.0, ds=0.05))):
+            (continuation.Tracer, "advance", lambda: scene.continuation(max_load=1.0, ds=0.05))):
         calls, step = [], getattr(module, name)
 
         def interrupted(*args, calls=calls, step=step):
