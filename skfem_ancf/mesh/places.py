@@ -111,35 +111,35 @@ class Finder:
         #: Tolerance of equal distances from axes.
         self.equal = 1e-8 * mesh.height
 
-    @np.errstate(all="ignore")
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
         """Elements (n,), reference points (2, n), relative distances outside of them (zero, or
         infinite or not a number far away) for points (2, n) of a ``chain`` or of all, and whether
         chains are equally near."""
-        n = x.shape[1]
-        noise = 1e-9 + 8 * EPS * (
-            self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
-        if self._line is not None:
-            d, first, start = self._line
-            along, across = d @ (x - first)
-            # a point of the section between two elements is one of the left
-            e = (start + noise * self.mesh.lengths)[1:].searchsorted(along)
-            xi = (along - start[e]) / self.mesh.lengths[e]
-            h = self.mesh.height if self.mesh.heights is None else (
-                self.mapping.height(xi[:, None], e)[0][:, 0])
-            X = np.array([xi, 0.5 + across / h])
-            outside = np.maximum(*np.abs(X - 0.5)) - 0.5
-            outside[outside < noise] = 0.0
-            return e, np.minimum(np.maximum(X, 0.0), 1.0), outside, np.zeros(n, dtype=bool)
-        if chain is not None or not self.is_chain:
-            return self._best(x, noise, *self._pairs(x, chain))
-        found = self._best(x, noise, np.arange(n), self._tree.query(x.T)[1] // SAMPLES)
-        # outside, in another element than the nearest sample, or on a section
-        left = np.flatnonzero((found[2] > 0.0) | (found[1][0] <= noise))
-        if len(left):
-            for old, new in zip(found, self._best(x[:, left], noise, *self._pairs(x[:, left]))):
-                old[..., left] = new
-        return found
+        with np.errstate(all="ignore"):
+            n = x.shape[1]
+            noise = 1e-9 + 8 * EPS * (
+                self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
+            if self._line is not None:
+                d, first, start = self._line
+                along, across = d @ (x - first)
+                # a point of the section between two elements is one of the left
+                e = (start + noise * self.mesh.lengths)[1:].searchsorted(along)
+                xi = (along - start[e]) / self.mesh.lengths[e]
+                h = self.mesh.height if self.mesh.heights is None else (
+                    self.mapping.height(xi[:, None], e)[0][:, 0])
+                X = np.array([xi, 0.5 + across / h])
+                outside = np.maximum(*np.abs(X - 0.5)) - 0.5
+                outside[outside < noise] = 0.0
+                return e, np.minimum(np.maximum(X, 0.0), 1.0), outside, np.zeros(n, dtype=bool)
+            if chain is not None or not self.is_chain:
+                return self._best(x, noise, *self._pairs(x, chain))
+            found = self._best(x, noise, np.arange(n), self._tree.query(x.T)[1] // SAMPLES)
+            # outside, in another element than the nearest sample, or on a section
+            left = np.flatnonzero((found[2] > 0.0) | (found[1][0] <= noise))
+            if len(left):
+                for old, new in zip(found, self._best(x[:, left], noise, *self._pairs(x[:, left]))):
+                    old[..., left] = new
+            return found
 
     def _best(self, x, noise, k, some):
         """The elements of :meth:`find` from pairs of points k and elements, (m,) each."""

@@ -83,23 +83,23 @@ class Increment:
         self.load, self.time = options.route.load_and_time(level)
         self.record = LoadStep(level)
 
-    @np.errstate(all="ignore")  # overflow shows in the residual
     def solve(self, stable: bool) -> Equilibrium:
         """The equilibrium, a stable one if requested; raises LoadStepFailed."""
-        system, start, route = self.system, self.start, self.options.route
-        found = self._augmented()
-        passed = system.forces.passed((start.u, route.load_and_time(start.load)[1]),
-                                      (found.u, self.time))
-        if passed:
-            raise LoadStepFailed(passed)
-        if not stable or start.unstable:
+        with np.errstate(all="ignore"):  # overflow shows in the residual
+            system, start, route = self.system, self.start, self.options.route
+            found = self._augmented()
+            passed = system.forces.passed((start.u, route.load_and_time(start.load)[1]),
+                                          (found.u, self.time))
+            if passed:
+                raise LoadStepFailed(passed)
+            if not stable or start.unstable:
+                return found
+            if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
+                raise Unstable("the equilibrium found is unstable", found)
+            if (start.rejected and route.proportional and start.load > 0.0
+                    and not strategies.heads_on(system, start, found.u, self.level)):
+                raise Unstable("the equilibrium found lies on the side away from the load", found)
             return found
-        if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
-            raise Unstable("the equilibrium found is unstable", found)
-        if (start.rejected and route.proportional and start.load > 0.0
-                and not strategies.heads_on(system, start, found.u, self.level)):
-            raise Unstable("the equilibrium found lies on the side away from the load", found)
-        return found
 
     def resting(self) -> Equilibrium | None:
         """The last equilibrium, if only round-off acts there; else None."""
