@@ -227,7 +227,8 @@ def draw_pressed(dice):
              dice.choice((f"scene.point_force((0.0, {-P}), at='right')",
                           f"scene.line_load((0.0, {-2 * P / L}))")),
              f"scene.point_force(({dice.number(-20, 20) * P}, 0.0), at='right', amplitude=path)"]
-    return "\n".join([*lines, f"options = {{'increments': {dice.integer(1, 5)}}}", ""])
+    options = {"increments": dice.integer(1, 5), "min_step": 0.02}
+    return "\n".join([*lines, f"options = {options}", ""])
 
 
 def draw(dice):
@@ -257,7 +258,7 @@ def draw(dice):
         lines.append(f"scene.add(Slider({min(EI)}, {dice.number(0.01, 0.5) * min(EI)}, "
                      f"'b{n - 1}'))")
     if any("Plastic" in line or "Slider" in line for line in lines):  # on a path, and back
-        options = {"increments": dice.integer(1, 5)}
+        options = {"increments": dice.integer(1, 5), "min_step": 0.02}
         lines.insert(0, f"path = lambda t: np.interp(t, [0, 1, 2], [0, 1, {dice.number(-1, 1)}])")
         lines = [line[:-1] + ", amplitude=path)" if line.startswith(LOADS) else line
                  for line in lines]
