@@ -194,8 +194,8 @@ def draw_leaves(dice):
             ("StVenantKirchhoff", "NeoHookean"))
         lines += [f"mesh{k} = MeshBeam.init_line(np.linspace(0, {dice.number(0.5, 1.0)}, "
                   f"{dice.integer(4, 10)}), {h}, origin=(0.0, {y}))",
-                  f"beam{k} = Beam(mesh{k}, {element}, {law}({E}, {dice.choice((0.0, 0.3))}), 0.1, "
-                  f"name='b{k}', compiled=COMPILED)"]
+                  f"beam{k} = Beam(mesh{k}, {element}, {law}({E}, {dice.choice((0.0, 0.3))}, 1), "
+                  f"0.1, name='b{k}', compiled=COMPILED)"]
     lines.append(f"scene = Scene({', '.join(f'beam{k}' for k in range(n))})")
     lines += [f"scene.clamp('left', beam=beam{k}, thickness='free')" for k in range(n)]
     lines.append(f"scene.contact('all', friction={dice.choice((0.0, 0.0, 0.3))})")
@@ -211,8 +211,9 @@ def draw_pressed(dice):
     gap, R = h * dice.choice((0.0, 0.001, 0.1)), dice.number(0.05, 0.5)
     element = dice.choice(("ElementBeamCable(3)", "ElementBeamCable(5)", "ElementBeamANCF(2)",
                            "ElementBeamANCFCubic(1)"))
-    material = dice.choice((f"StVenantKirchhoff({E}, 0.3)", f"NeoHookean({E}, 0.3)",
-                            f"ElasticPlastic({E}, 0.3, {0.2 * h / L * E}, {0.1 * E})"))
+    material = dice.choice((f"StVenantKirchhoff({E}, 0.3, 1)", f"NeoHookean({E}, 0.3, 1)",
+                            f"ElasticPlastic({E}, 0.3, {0.2 * h / L * E}, {0.1 * E}, "
+                            "density=1)"))
     if "Cable" in element or "Plastic" in material:
         material = material.replace("NeoHookean", "StVenantKirchhoff")
         element = element.replace("Cubic(1)", "Cubic(2)")
