@@ -373,7 +373,7 @@ class Body:
         for law, tables, dV in self.terms:
             strain, F = self._strains(tables, q)
             if self.past is not None:
-                flow = self.past[:3] / law.scale.reshape(3, 1, 1)
+                flow = self._flow() / law.scale.reshape(3, 1, 1)
                 strain = strain - flow.reshape(3, *(1,) * (strain.ndim - 3), *flow.shape[1:])
             S = law.stress(strain) * dV
             for name, (T, matrix), (rx, ry), s in zip(("xx", "yy", "xy"), tables, F, S):
@@ -385,6 +385,13 @@ class Body:
                     J, r = (0, rx) if name == "xx" else (1, ry)
                     total = total + np.einsum("epk,...epi->...eki", T[J], s * r, optimize=True)
         return total
+
+    def _flow(self):
+        """Plastic strain; in plane strain that across the plane is an elastic strain, too."""
+        flow, m = self.past[:3].copy(), self.beam.material
+        if m.plane == "strain":
+            flow[:2] -= m.nu * (flow[0] + flow[1])
+        return flow
 
     def _fibres(self, n):
         """Distances from the axis, and shares of the area."""
@@ -413,10 +420,7 @@ class Body:
         N = self.EA * (np.sqrt(s) - np.sqrt(s0)) * self.w
         M = self.EI * (kappa - kappa0) * self.w
         if self.past is not None:
-            m, flow = self.beam.material, self.past[0]
-            if m.plane == "strain":  # plastic strain across the plane adds to the elastic one
-                flow = flow - m.nu * (self.past[0] + self.past[1])
-            flow = flow.reshape(*s0.shape, -1)
+            flow = self._flow()[0].reshape(*s0.shape, -1)
             y, w = self._fibres(flow.shape[-1])
             N = N - self.EA * (flow @ w) * self.w
             M = M + self.EA * (flow @ (w * y)) * self.w

@@ -82,9 +82,11 @@ def test_leaves_that_touch_are_checked():
 
 def test_points_that_yield_are_checked():
     """On their way back: what is not on the yield surface is seen, and hardening that is wrong."""
-    for beam in ("ElementBeamCable(3)", "ElementBeamANCF(2)"):
+    for beam, plane, y in (("ElementBeamCable(3)", "stress", 1e4), (
+            "ElementBeamANCF(2)", "stress", 1e4), ("ElementBeamANCF(2)", "strain", 8e3)):
         script = PLAIN.replace("ELEMENTS[\"ancf-2\"](), StVenantKirchhoff(1e6, 0.3, 1.0)", (
-            f"{beam}, ElasticPlastic(1e6, 0.3, 1e4, 1e4, 1e5)")).format(formulation="assumed")
+            f"{beam}, ElasticPlastic(1e6, 0.3, {y}, 1e4, 1e5, plane={plane!r})"))
+        script = script.format(formulation="assumed")
         script = script.replace("at=(1.0, 0.0)", "at=(1.0, 0.0),\n    amplitude=lambda t: "
                                 "0.6 * np.interp(t, [0, 1, 2], [0, 1, -1])")
         script = script.replace("{}", "{'increments': 4}")
