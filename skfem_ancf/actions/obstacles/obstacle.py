@@ -35,8 +35,9 @@ STEP = 1e-6
 #: Points across an end.
 ACROSS = 3
 #: Depth to which a circle may sink in between two points of a straight surface, relative to the
-#: height; largest number of points along an element.
-SINK, MOST = 1e-2, 200
+#: height; largest distance of points relative to its radius R, as forces along the surface are
+#: wrong by d / (2 R) of the normal ones; largest number of points along an element.
+SINK, RIPPLE, MOST = 1e-2, 0.05, 200
 
 
 class Obstacle(ForceElement):
@@ -76,8 +77,9 @@ class Obstacle(ForceElement):
         time per length, zero or positive; the pressure stays positive.
     points
         Points along each element on bottom and top, at least 2, of a Gauss-Lobatto rule. By default
-        two more than the degree of the axis, in as many intervals as needed for a shape of small
-        radius to sink in between points by at most a hundredth of the height.
+        two more than the degree of the axis, in as many intervals as a shape of small radius needs,
+        up to 200: it sinks in between points by at most a hundredth of the height, and these are
+        at most a twentieth of the radius apart, so that it slides without a ripple.
     width
         Length of the transition from no pressure to proportional pressure; by default a thousandth
         of the height.
@@ -208,7 +210,8 @@ class Obstacle(ForceElement):
         bend, longest = self.shape.bend, float(beam.mesh.lengths.max())
         apart = longest * float(np.max(np.diff(rule[0])))
         if self.points is None and bend > 0.0:
-            wanted = np.ceil(apart / np.sqrt(8.0 * SINK * bend * beam.mesh.height))
+            wanted = np.ceil(apart / min(np.sqrt(8.0 * SINK * bend * beam.mesh.height),
+                                         RIPPLE * bend))
             pieces = int(np.clip(wanted, 1, MOST // len(rule[0])))
             rule, apart = _repeated(*rule, pieces), apart / pieces
         if apart > 2.0 * bend > 0.0:
