@@ -151,12 +151,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
             start, straight = points[-1], branch is None or len(points) > 1
             try:
                 point = tracer.set_tangent(tracer.advance(start, step), start)
-                # the deviation from a straight line
-                mean = 0.5 * step * (start.tangent + point.tangent)
-                bend = tracer.norm(point.u - start.u - mean) / step
-                if (scale := max(abs(start.load), abs(point.load))) > 0:
-                    gap = point.load - start.load - 0.5 * step * (start.rate + point.rate)
-                    bend = max(bend, abs(gap) / scale)
+                bend = _bend(tracer, start, point, step)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
                     raise LoadStepFailed("the path turns")
                 last = abs(point.load) >= limit
@@ -193,6 +188,14 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                 growth = min(growth, np.sqrt(TURN / bend))
             step = min(ds_max, step * np.clip(growth, 0.5, 1.5))
     return points, critical
+
+
+def _bend(tracer, a, b, ds):
+    """The deviation of a path between two points, a step ds apart, from a straight line."""
+    bend = tracer.norm(b.u - a.u - 0.5 * ds * (a.tangent + b.tangent)) / ds
+    scale = max(abs(a.load), abs(b.load))
+    gap = b.load - a.load - 0.5 * ds * (a.rate + b.rate)
+    return max(bend, abs(gap) / scale) if scale > 0 else bend
 
 
 class Tracer:

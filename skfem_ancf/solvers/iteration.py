@@ -68,15 +68,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
                 return INDEFINITE, k + 1, k, False, UNSEEN
             good = True
         else:
-            for i in indices(phi.size):
-                phi[i] = -phi[i]
-            stiff, more = e.K.flat.copy() if loose > 0.0 else e.K.flat[:0], 1.0
-            good = call_solver(target.solver, target.at, u, multipliers, R, phi, du, dm)
-            while loose > 0.0 and good and dot(R, du) < 0.0 and more < MOST_DRAG:
-                more *= MORE_DRAG  # what snaps through is held, so that corrections go downhill
-                e.K.flat[:] = stiff
-                add_to_diagonal(e.K, more * x[DRAG])
-                good = call_solver(target.solver, target.at, u, multipliers, R, phi, du, dm)
+            good = _solve(e, target, loose, x, m)
         before, work = work, np.inf
         if good:
             work = np.sqrt(abs(dot(R, du)) + abs(dot(phi, dm)))
@@ -97,6 +89,22 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         contraction = work / before if before > 0.0 else 1.0
         last = (k >= FEWEST or at_rest) and is_small(work, contraction, rules.tol, reference,
                                                      rules.noise)
+
+
+@source
+def _solve(e, target, loose, x, m):
+    """Set the corrections x[DU] and m[2] by the linear solver; False if it fails."""
+    u, R, du, multipliers, phi, dm = x[U], x[RESIDUAL], x[DU], m[0], m[1], m[2]
+    for i in indices(phi.size):
+        phi[i] = -phi[i]
+    stiff, more = e.K.flat.copy() if loose > 0.0 else e.K.flat[:0], 1.0
+    good = call_solver(target.solver, target.at, u, multipliers, R, phi, du, dm)
+    while loose > 0.0 and good and dot(R, du) < 0.0 and more < MOST_DRAG:
+        more *= MORE_DRAG  # what snaps through is held, so that corrections go downhill
+        e.K.flat[:] = stiff
+        add_to_diagonal(e.K, more * x[DRAG])
+        good = call_solver(target.solver, target.at, u, multipliers, R, phi, du, dm)
+    return good
 
 
 @apart("statics", Equations, Annotated[Target, MADE], F1, F1, F1, F1, F1)

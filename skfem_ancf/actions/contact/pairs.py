@@ -580,12 +580,12 @@ def pair_stiffness(t, z0, z1, same, facets, zeta, K):
         if friction > 0.0:
             force, sticks, _ = rubbing(t, f1, p, e, k, friction * k * mean * met.share[i])
         change = friction * np.sign(force) * (1.0 - sticks) * slope
-        both, bent, p = s * dot(outer, d), s * dot(outer, 1j * d), k * mean
+        both, bent, load = s * dot(outer, d), s * dot(outer, 1j * d), k * mean
         for x in range(COMPONENTS):
             w = depth / square * (turns[x, i] + curl * M[x, i])
             by_g, by_s = slope * G[x, i] - change * S[x, i], twice * sticks * k * S[x, i]
-            by_turn, by_m = p * (M[x, i] - w), p * (curl * (M[x, i] - w) + turns[x, i])
-            by_unit, by_across = -p * both * across[x, i], p * (
+            by_turn, by_m = load * (M[x, i] - w), load * (curl * (M[x, i] - w) + turns[x, i])
+            by_unit, by_across = -load * both * across[x, i], load * (
                 bent * across[x, i] - both * unit[x, i])
             for y in range(COMPONENTS):
                 K[COMPONENTS * x + y, i] = (

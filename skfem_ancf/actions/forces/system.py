@@ -71,21 +71,7 @@ class Forces:
         self.masses = [e for e in elements if e.mass_entries() is not None]
         self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
                          for e in elements]
-        parts: list[KernelElement] = []
-        self.custom, self.changing = [], []
-        for element in self.elements:
-            found = element.parts()
-            if found is not None:
-                parts += found
-            elif element.changing:
-                self.changing.append((recalled(element), element.all_dofs))
-            else:
-                self.custom.append(recalled(element))
-        self.remembering = [e for e in (*self.custom, *(e for e, _ in self.changing))
-                            if isinstance(e, Remembering)]
-        order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
-        self.parts = [parts[k] for k in order]
-        self._place = np.argsort(order) if order else np.zeros(0, np.int64)
+        self._sort()
         n = len(self.parts)
         # of each element its links, the rows of their components in the vectors (those of the parts
         # side by side), two of these for each derivative, and the numbers of the derivatives
@@ -128,6 +114,24 @@ class Forces:
         self.resists = (any(e.resists for e in (*self.custom, *(e for e, _ in self.changing)))
                         or any(c > 0.0 for c in damping)
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
+
+    def _sort(self):
+        """Sort elements into parts that the kernels know, by kind, and the user's, by pattern."""
+        parts: list[KernelElement] = []
+        self.custom, self.changing = [], []
+        for element in self.elements:
+            found = element.parts()
+            if found is not None:
+                parts += found
+            elif element.changing:
+                self.changing.append((recalled(element), element.all_dofs))
+            else:
+                self.custom.append(recalled(element))
+        self.remembering = [e for e in (*self.custom, *(e for e, _ in self.changing))
+                            if isinstance(e, Remembering)]
+        order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
+        self.parts = [parts[k] for k in order]
+        self._place = np.argsort(order) if order else np.zeros(0, np.int64)
 
     def _pair(self, fresh=False):
         """Set the tables of contact of members, and the other elements that change their pattern;

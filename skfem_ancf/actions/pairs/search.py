@@ -13,8 +13,8 @@ import scipy
 from ...core import Array
 from ...core.callbacks import handle_of
 from ...core.words import Words
-from ..contact.pairs import (APART, EDGE, ON, Candidates, PairTables, cross, dot, facing,
-                             together)
+from ..contact.pairs import APART, EDGE, ON, Candidates, PairTables, facing, together
+from ..contact.plane import cross, dot
 from ..contact.tables import weights_of_motion
 from .facets import Facets
 
@@ -93,7 +93,7 @@ class Search:
         self._near = 0.6 * f.lengths / m + f.offsets
         self.joined = self._joined(solids)
         penalty, width, friction = numbers
-        of_facets = {name: np.ascontiguousarray(getattr(f, name), dtype=kind) for kind, names in (
+        of_facets = {name: _packed(getattr(f, name), kind) for kind, names in (
             (float, "sides offsets places lengths spans heights firmness zeta areas"),
             (np.int64, "members chains curves of")) for name in names.split()}
         if penalty is not None:
@@ -215,7 +215,6 @@ class Search:
                 np.abs(s[j] - q) < apart)
             i, j = i[~known], j[~known]
         return ends[i[0]].mean() if len(i) else None
-
 
     def entered(self, z0: Array, z1: Array) -> complex | None:
         """A place where an axis, or the middle of a solid, enters a solid, z0 to z1, or None."""
