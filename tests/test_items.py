@@ -13,7 +13,8 @@ from skfem import LinearForm
 from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamCable, Energy,
                         FormLoad, InputError, Item, MeshBeam, PointMass, Prony, Scene, Spring,
                         StVenantKirchhoff, sweep)
-from skfem_ancf.actions.forces import point
+from skfem_ancf.actions.bound import BoundConstraint
+from skfem_ancf.actions.forces import ForceElement, point
 from skfem_ancf.actions.joints import JOINTS, Joint, Motor
 from skfem_ancf.dynamics import SCHEMES
 from skfem_ancf.scene.model import Model
@@ -91,6 +92,17 @@ class Quartic(Tip):
 
 class Everywhere(Quartic):
     named = False
+
+
+class QuarticPoint(ForceElement):
+    """The same on a point, by its potential alone."""
+
+    def bind(self, scene):
+        return [point(scene, 0, (1.0, 0.0))]
+
+    def potential(self, x):
+        d = x[0] - np.array([1.0, 0.0])
+        return 30.0 * (d @ d) + 500.0 * (d @ d) ** 2
 
 
 class Forced(Tip):
@@ -212,6 +224,54 @@ class DragRail(Joint):
         return 0.5 * self.k * (self.r(u)[0] - self.at[0] - history[0]) ** 2
 
 
+class Feeler(Tip):
+    """The end clings to whichever point of the other beam is nearest, and slips along y, with a
+    dashpot, a mass and a path that moves: of all that an item may have something."""
+
+    symmetric, k, most, c = False, 40.0, 0.3, 0.5
+
+    def bind(self, layout):
+        bound, unit = super().bind(layout), (0.0, 1.0)
+        others = [point(layout, 1, (x, 0.0)) for x in np.linspace(0.5, 1.5, 7)]
+        bound.others, bound.up = others, bound.r.row(unit, layout.N)
+        bound.gaps = np.array([bound.up - one.row(unit, layout.N) for one in others])
+        bound.dofs = np.unique(np.concatenate([one.dofs.ravel() for one in (bound.r, *others)]))
+        return bound
+
+    def gap(self, u):
+        far = [np.sum((self.r(u) - one(u)) ** 2) for one in self.others]
+        return self.gaps[np.argmin(np.real(far))]
+
+    def start(self):
+        return np.zeros(1)
+
+    def evaluate(self, u, v, t, history, dt):
+        row = self.gap(u)
+        f = -self.k * (row @ u - history[0])
+        f = f / max(1.0, abs(np.real(f)) / self.most)
+        return (f - self.c * (row @ v)) * row, np.array([row @ u + f / self.k])
+
+    def stiffness(self, u, v, t, history, dt):
+        row = sparse.csr_array(self.gap(u)[None])
+        sticks = abs(self.k * ((row @ u)[0] - history[0])) < self.most
+        return -self.k * sticks * (row.T @ row)
+
+    def damping(self, u, v, t, history, dt):
+        row = sparse.csr_array(self.gap(u)[None])
+        return -self.c * (row.T @ row)
+
+    def energy(self, u, history):
+        return 0.5 * self.k * (self.gap(u) @ u - history[0]) ** 2
+
+    def mass(self):
+        return 0.2 * sum(np.outer(row, row) for row in (
+            self.up, self.r.row((1.0, 0.0), len(self.up))))
+
+    def constraint(self, u, t):
+        x, y = self.way(u)
+        return np.array([x + 0.3 * y * y - 1e-4 * t])
+
+
 def unscaled():
     return Energy(bedding, beam=0, scaled=False)
 
@@ -220,7 +280,7 @@ def following():
     return FormLoad(across, beam=0)
 
 
-CUSTOM = (Quartic, Pull, Slip, Bob, Rail, Lift, DragRail, unscaled, following)
+CUSTOM = (Quartic, Pull, Slip, Bob, Rail, Lift, DragRail, Feeler, unscaled, following)
 
 
 def item_of(name):
@@ -337,11 +397,84 @@ def test_a_sweep_of_a_custom_item():
 def test_an_energy_and_its_force_are_one():
     """By differences of the energy, by the force alone, and with its stiffness."""
     scenes = [bare().gravity((0.0, -9.81)).add(item) for item in (
-        Quartic(), Everywhere(), Forced())]
+        Quartic(), Everywhere(), Forced(), QuarticPoint())]
     known = scenes[0].solve_static()
     for scene in scenes[1:]:
         assert_allclose(scene.solve_static().u, known.u, rtol=0, atol=1e-9)
     history = scenes[0].integrate(0.02, 1e-3)
+    assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
+
+
+class Wall(Tip):
+    """A penalty in place of a wall above the end, whose stiffness is its history, and grows until
+    the end is at most 1e-6 in the wall."""
+
+    symmetric, dissipates, at = False, False, 0.01
+
+    def start(self):
+        return np.array([1e3])
+
+    def depth(self, u):
+        return np.maximum(self.way(u)[1] - self.at, 0.0)
+
+    def evaluate(self, u, v, t, history, dt):
+        return -history[0] * self.depth(u) * self.r.row((0.0, 1.0), len(u)), history
+
+    def corrected(self, u, t, history):
+        return 10.0 * history if self.depth(u) > 1e-6 else None
+
+
+class WallPoint(ForceElement):
+    """The same on a point."""
+
+    symmetric, dissipates, at, start = False, False, Wall.at, Wall.start
+
+    def bind(self, scene):
+        return [point(scene, 0, (1.0, 0.0))]
+
+    def evaluate(self, x, v, t, history, dt):
+        depth = np.maximum(x[0, 1] - self.at, 0.0)
+        return np.array([[0.0, -1.0]]) * history[0] * depth, history
+
+    def corrected(self, x, t, history):
+        return 10.0 * history if x[0, 1] - self.at > 1e-6 else None
+
+
+def test_an_item_may_repeat_an_increment_with_another_history():
+    """As a force element: the stiffness of a wall is the least power of ten that holds."""
+    made = {}
+    for kind in (Wall, WallPoint):
+        scene = bare().add(kind()).point_force((0.0, 40.0), at=(1.0, 0.0), beam=0)
+        made[kind] = scene.solve_static()
+    one, other = made.values()
+    assert_allclose(one.u, other.u, rtol=0, atol=1e-12)
+    assert np.array_equal(one.memory, other.memory)
+    depth = one.displacement((1.0, 0.0), 0)[1] - Wall.at
+    power = np.log10(one.memory[0])
+    assert power == round(power) and 1e-7 < depth < 1e-6
+    known = bare().fix("right", "r^2", displacement=Wall.at + depth, beam=0).solve_static()
+    held = 40.0 - known.reactions("right", 0).force[1]
+    assert one.memory[0] * depth == pytest.approx(held, rel=1e-5)
+
+
+class Midway(Tip):
+    """A hardening spring of the end, whose mean force has the work of its energy."""
+
+    def energy(self, u, t):
+        return 1e4 * self.way(u)[1] ** 4
+
+    def force(self, u, v, t):
+        return -4e4 * self.way(u)[1] ** 3 * self.r.row((0.0, 1.0), len(u))
+
+    def mean_force(self, u, w, t):
+        a, b = self.way(u)[1], self.way(w)[1]
+        type(self).asked = True
+        return -1e4 * (a + b) * (a * a + b * b) * self.r.row((0.0, 1.0), len(u))
+
+
+def test_an_item_may_have_a_mean_force():
+    history = bare().gravity((0.0, -9.81)).add(Midway()).integrate(0.02, 1e-3)
+    assert Midway.asked
     assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
 
 
@@ -367,14 +500,21 @@ class Inside(Item):
         return bound
 
     def __getattr__(self, name):
-        one = {"force": "force", "mass": "mass", "constraint": "line"}.get(name)
-        if one is None or vars(self).get("what") != one:
+        those = {"force": ("force", "sparse"), "stiffness": ("sparse",), "mass": ("mass",),
+                 "constraint": ("line",)}.get(name, ())
+        if vars(self).get("what") not in those:
             raise AttributeError(name)
         return getattr(self, "_" + name)
 
     def _force(self, u, v, t):
         d = self.r(u) - np.array([0.7, -0.6])
         return -40.0 * (1.0 - 0.6 / np.sqrt(d @ d)) * d @ self.rows
+
+    def _stiffness(self, u, v, t):
+        d = self.r(u) - np.array([0.7, -0.6])
+        n, size = d / np.sqrt(d @ d), np.sqrt(d @ d)
+        K = -40.0 * ((1.0 - 0.6 / size) * np.eye(2) + 0.6 / size * np.outer(n, n))
+        return sparse.csr_array(self.rows.T @ K @ self.rows)
 
     def _mass(self):
         return 0.05 * self.rows.T @ self.rows
@@ -385,6 +525,7 @@ class Inside(Item):
 
 @pytest.mark.parametrize("what, known", [
     ("force", lambda: Spring(40.0, ((0.7, 0.0), ("ground", (0.7, -0.6))))),
+    ("sparse", lambda: Spring(40.0, ((0.7, 0.0), ("ground", (0.7, -0.6))))),
     ("mass", lambda: PointMass(0.05, (0.7, 0.0))),
     ("line", lambda: JOINTS["line"]((0.7, 0.0), (1.0, 0.0)))])
 def test_section_forces_know_where_a_custom_item_acts(what, known):
@@ -444,6 +585,12 @@ class ProfileJoint(Joint):
         return np.repeat(k, len(k)), np.tile(k, len(k)), K.ravel()
 
 
+class ProfileAlone(ProfileJoint):
+    """Its curvature by differences."""
+
+    curvature = BoundConstraint.curvature
+
+
 def rising_from(x0):
     return lambda x: 5.0 * np.where(np.real(x) > x0, x - x0, 0.0 * x) ** 2
 
@@ -453,7 +600,7 @@ def bump(x):
     return np.where(inside, 0.5 * (1.0 - np.cos(10.0 * np.pi * (x - 0.1))), 0.0 * x) * 0.02
 
 
-@pytest.mark.parametrize("kind", [Profile, ProfileJoint])
+@pytest.mark.parametrize("kind", [Profile, ProfileJoint, ProfileAlone])
 @pytest.mark.parametrize("profile, x", [(rising_from(0.05), 0.1), (rising_from(0.3), 0.35),
                                         (bump, 0.2)])
 def test_a_profile_may_be_straight_at_first(kind, profile, x):

@@ -295,6 +295,9 @@ def test_what_cannot_be_linearised_is_said():
         scene.linearize(None, [PointForce((0, 1), at=(1, 0))], ["tipp"])
     with pytest.raises(InputError, match="an input is a Load"):
         scene.linearize(None, [(0, 1)])
+    for inputs, outputs in (([], ["tip"]), ([PointForce((0, 1), at=(1, 0))], [])):
+        with pytest.raises(InputError, match="has inputs, .* and outputs"):
+            scene.linearize(None, inputs, outputs)
     moving = scene.initial_velocity((0, 0.1)).integrate(0.01, 0.01).state(-1)
     with pytest.raises(InputError, match="at rest"):
         scene.linearize(moving, [PointForce((0, 1), at=(1, 0))])

@@ -173,7 +173,7 @@ def test_those_that_fit_are_taken():
     (Frozen, "constant = False"), (Negative, r"stiffness\(u\).*not the derivative of force"),
     (Sideways, "symmetric = False"), (Gaining, r"force\(u\).*derivative of potential"),
     (Slack, r"jacobian\(u, t\).*derivative of value"),
-    (Straight, r"curvature\(u, t, multipliers\).*zero unless it is defined")])
+    (Straight, r"curvature\(u, t, multipliers\).*zero with constant = True")])
 def test_derivatives_of_loads_and_joints(thing, message):
     """Frequencies, energies and states were wrong without a word."""
     with pytest.raises(InputError, match=message):

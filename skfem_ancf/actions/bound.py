@@ -27,14 +27,19 @@ _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
 class Bound:
-    """Part of a bound item, with its name and the key of its copies."""
+    """Part of a bound item, with its name and the key of its copies. ``of_item`` is the item of
+    displacements whose functions it has, if it is not bound itself."""
 
     name: str | None = None
+    of_item: Any = None
     _key: bytes = b""
 
     def same(self, other: Any) -> bool:
         """True if both are of one item, bound or not."""
         return self._key == getattr(other, "_key", None)
+
+    def __repr__(self) -> str:
+        return super().__repr__() if self.of_item is None else repr(self.of_item)
 
 
 class BoundConstraint(Bound):
@@ -70,8 +75,19 @@ class BoundConstraint(Bound):
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
         """Hessian, the sum over k of multipliers[k] d^2 Phi_k / du^2: rows, columns and values
-        (k,); None if the Jacobian is constant."""
-        return None
+        (k,); None if the Jacobian is constant. By default by differences of the Jacobian."""
+        if self.constant:
+            return None
+        at = np.flatnonzero(np.any(self.jacobian(u, t) != 0.0, axis=0))
+
+        def pulled(x: Array) -> Array:
+            w = np.asarray(u, dtype=x.dtype).copy()
+            w[at] = x
+            return multipliers @ self.jacobian(w, t)
+
+        H = derivative(pulled, u[at])
+        i, j = np.nonzero(H)
+        return i, at[j], H[i, j]
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
         """Second directional derivative of Phi along v, shape (m,)."""
@@ -158,6 +174,7 @@ class BoundForce(Bound):
     links: Any = ()
     groups: Any = ()
     entries: tuple[Array, Array] | None = None
+    masses: tuple[Array, Array, Array] | None = None
     changing = False
     #: Steps and increments change its history, if it has one; else only samples do.
     evolves = True
@@ -170,8 +187,11 @@ class BoundForce(Bound):
         return np.concatenate([link.dofs.ravel() for link in self.links])
 
     def force(self, x: Array, v: Array, t: float) -> Array:
-        """Force on each point, (n, 2); on section directions the conjugate force."""
-        raise NotImplementedError
+        """Force on each point, (n, 2); on section directions the conjugate force. By default minus
+        the gradient of the potential."""
+        if self.potential_at(x, t) is None:
+            raise NotImplementedError("neither a force nor a potential")
+        return -derivative(lambda y: self.potential_at(y, t), np.asarray(x))
 
     def potential(self, x: Array) -> float | None:
         """Potential of the force at zero velocity; None if there is none."""
@@ -211,6 +231,8 @@ class BoundForce(Bound):
 
     def resistance(self, x: Array, v: Array, t: float) -> Any:
         """Derivative of the force by the velocities, as :meth:`stiffness`."""
+        if not self.resists:
+            return np.zeros((len(x), 2, len(x), 2))
         return derivative(lambda w: self.force(x, w, t), v)
 
     def search_intervals(self, x: Array, y: Array) -> float:
@@ -227,11 +249,11 @@ class BoundForce(Bound):
 
     def mass_entries(self) -> tuple[Array, Array, Array] | None:
         """Rows, columns and values (k,) added to the mass matrix; None for none."""
-        return None
+        return self.masses
 
     def parts(self) -> list[Any] | None:
         """Its parts of kinds that kernels know, once bound; None for a user-defined element."""
-        return None
+        return None if len(self.links) else []
 
 
 def differences(function: Callable[[Array], Any], x: Array) -> Array:
@@ -310,7 +332,7 @@ class Remembering:
 
     def _derivative(self, name, function, at, *x):
         own = getattr(self.element, name)
-        if own.__func__ is not getattr(BoundForce, name):
+        if getattr(own, "__func__", None) is not getattr(BoundForce, name):
             return own(*x, self.history, float(self.span[0]))
         return derivative(function, at)
 
@@ -325,7 +347,7 @@ class Remembering:
 
     def potential_at(self, x: Array, t: float, history: Array | None = None) -> float | None:
         own = self.element.potential
-        if own.__func__ is BoundForce.potential:
+        if getattr(own, "__func__", None) is BoundForce.potential:
             return None
         found = own(x, self.history if history is None else history)
         return None if found is None else float(found)
@@ -378,7 +400,7 @@ def positions(element: Any, u: Array) -> Array:
 
 def is_like(one: Remembering, other: Remembering) -> bool:
     """True for elements of one class on the same places, with histories of one size."""
-    a, b = (getattr(x.element, "item", x.element) for x in (one, other))
+    a, b = (x.element.of_item or x.element for x in (one, other))
     return type(a) is type(b) and one.start.shape == other.start.shape and np.array_equal(
         one.all_dofs, other.all_dofs)
 
@@ -394,7 +416,7 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     x = np.array([x.start for x in bound.links])
     n, zero = len(x), np.zeros_like(x)
     require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
-    own = not is_builtin(getattr(bound, "item", bound))
+    own = not is_builtin(bound.of_item or bound)
     if bound.changing:
         K = bound.stiffness(x, zero, 0.0)
         if not sparse.issparse(K) or K.shape != (2 * n, 2 * n):
@@ -458,7 +480,7 @@ def require_derivatives(joint: BoundConstraint, sizes: Array, u: Array, d: Array
     if found is not None:
         i, j, v = found
         np.add.at(turned, i, v * d[j])
-    require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero unless it is defined,",
+    require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero with constant = True,",
                   "multipliers @ jacobian(u, t)",
                   [multipliers @ one * sizes for one in (before, J, after)], turned * sizes)
 
@@ -564,148 +586,112 @@ class MemberForce(BoundForce):
         return repr(self.source)
 
 
-class UserForce(BoundForce):
-    """Energy, force and mass of a user-defined item, on pairs of its degrees of freedom. ``past``
-    are history and time of an increment, of an item with a memory."""
+def _pairs(where, force):
+    item, N, dofs = where
+    refuse(np.shape(force) != (N,), "the force of {!r} must have the shape ({},), got {}", item, N,
+           np.shape(force))
+    return np.asarray(force)[dofs].reshape(-1, 2)
 
-    def __init__(self, item: Any, layout: Layout) -> None:
-        if hasattr(item, "start"):
-            self.start, self.evaluate = item.start, self._evaluate
-        self.item, self._N, self.symmetric = item, layout.N, item.symmetric
-        self.name, self._key, self.dissipates = item.name, item._key, item.dissipates
-        dofs = np.arange(layout.N) if item.dofs is None else np.unique(item.dofs)
-        if dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < layout.N):
-            raise InputError(f"dofs of {item!r} must be numbers from 0 to {layout.N - 1}, got "
-                             f"{shown(item.dofs)}")
-        self.resists = hasattr(item, "force") or hasattr(item, "evaluate")
-        self._forced = hasattr(item, "energy") or self.resists
-        pairs = np.unique(dofs // 2) if self._forced else dofs[:0]
-        self._dofs = (2 * pairs[:, None] + np.arange(2)).ravel()
-        self.links = [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in pairs]
-        self._mass = None if not hasattr(item, "mass") else _entries(
-            f"mass() of {item!r}", item.mass(), layout.N)
-        if self._forced:
-            if hasattr(item, "stiffness"):
-                zero = np.zeros(layout.N)
-                past = (item.start(), 0.0) if hasattr(item, "start") else ()
-                self.changing = sparse.issparse(item.stiffness(zero, zero, 0.0, *past))
-            try_force(self, layout.sizes[self._dofs].reshape(-1, 2))
 
-    def _whole(self, x):
-        out = np.zeros(self._N, dtype=np.asarray(x).dtype)
-        out[self._dofs] = np.ravel(x)
+def _between_pairs(where, derivative):
+    _, _, dofs = where
+    matrix, n = sparse.csr_array(derivative)[dofs][:, dofs], len(dofs) // 2
+    return matrix if sparse.issparse(derivative) else matrix.toarray().reshape(n, 2, n, 2)
+
+
+def _pairs_and_history(where, found):
+    force, history = found
+    return _pairs(where, force), history
+
+
+def _number(where, energy):
+    return energy if np.iscomplexobj(energy) else float(energy)
+
+
+#: What a bound force may have of an item of displacements: the names of both, and what makes of
+#: a result on all degrees of freedom one on pairs of those of the item.
+OF_ITEMS: dict[str, tuple[str, Any]] = {
+    **{name: (name, _pairs) for name in ("force", "mean_force", "mean")},
+    "evaluate": ("evaluate", _pairs_and_history), "stiffness": ("stiffness", _between_pairs),
+    "resistance": ("damping", _between_pairs), "mean_stiffness": ("mean_stiffness", _between_pairs),
+    **{name: (name, lambda where, found: found) for name in (
+        "start", "corrected", "relaxed", "passed", "search_intervals", "sample")}}
+
+
+def of_pairs(where: tuple[Any, int, Array], name: str, *arguments: Any) -> Any:
+    """What a bound force has of an item, at arguments of its pairs of DOFs, arrays (n, 2)."""
+    item, N, dofs = where
+    own, result = OF_ITEMS.get(name, ("energy", _number))
+    whole = []
+    for x in arguments:
+        whole.append(x)
+        if np.ndim(x) == 2:
+            whole[-1] = np.zeros(N, dtype=x.dtype)
+            whole[-1][dofs] = np.ravel(x)
+    return result(where, getattr(item, own)(*whole))
+
+
+def force_of(item: Any, layout: Layout) -> BoundForce:
+    """Energy, force and mass of an item of displacements, on pairs of its degrees of freedom."""
+    out, N, zero = BoundForce(), layout.N, np.zeros(layout.N)
+    out.of_item, out.name, out._key = item, item.name, item._key
+    out.symmetric, out.dissipates = item.symmetric, item.dissipates
+    dofs = np.arange(N) if item.dofs is None else np.unique(item.dofs)
+    if dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < N):
+        raise InputError(f"dofs of {item!r} must be numbers from 0 to {N - 1}, got "
+                         f"{shown(item.dofs)}")
+    if hasattr(item, "mass"):
+        M = sparse.coo_array(item.mass())
+        refuse(M.shape != (N, N), "mass() of {!r} must have the shape {}, got {}", item, (N, N),
+               M.shape)
+        require_entries(f"mass() of {item!r}", M.row, M.col, M.data, N)
+        out.masses = M.row, M.col, M.data
+    if not any(hasattr(item, name) for name in ("energy", "force", "evaluate")):
         return out
-
-    def _evaluate(self, x, v, t, history, dt):
-        force, after = self.item.evaluate(self._whole(x), self._whole(v), t, history, dt)
-        return self._at(force), after
-
-    def force(self, x: Array, v: Array, t: float, *past: Any) -> Array:
-        if past:
-            return self._evaluate(x, v, t, *past)[0]
-        if hasattr(self.item, "force"):
-            return self._at(self.item.force(self._whole(x), self._whole(v), t))
-        return -derivative(lambda y: self.item.energy(self._whole(y), t), np.asarray(x))
-
-    def _at(self, force):
-        found = np.asarray(force)
-        refuse(found.shape != (self._N,), "the force of {!r} must have the shape ({},), got {}",
-               self.item, self._N, found.shape)
-        return found[self._dofs].reshape(-1, 2)
-
-    def potential(self, x: Array, *past: Any) -> float | None:
-        """Energy at a history, or at a time without a memory."""
-        return float(self.item.energy(self._whole(x), *past)) if hasattr(
-            self.item, "energy") else None
-
-    def potential_at(self, x: Array, t: float) -> float | None:
-        return self.potential(x, t)
-
-    def _derivative_by(self, name, x, v, t, otherwise, *past):
-        if not hasattr(self.item, name):
-            return sparse.csr_array((x.size, x.size)) if self.changing else otherwise()
-        found = getattr(self.item, name)(self._whole(x), self._whole(v), t, *past)
-        matrix = sparse.csr_array(found)[self._dofs][:, self._dofs]
-        n = len(self._dofs) // 2
-        return matrix if self.changing else matrix.toarray().reshape(n, 2, n, 2)
-
-    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Any:
-        return self._derivative_by("stiffness", x, v, t, lambda: derivative(
-            lambda y: self.force(y, v, t, *past), x), *past)
-
-    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Any:
-        if not (self.resists or self.changing):
-            return np.zeros((len(x), 2, len(x), 2))
-        return self._derivative_by("damping", x, v, t, lambda: derivative(
-            lambda w: self.force(x, w, t, *past), v), *past)
-
-    def mass_entries(self) -> tuple[Array, Array, Array] | None:
-        return self._mass
-
-    def parts(self) -> list[Any] | None:
-        return None if self._forced else []
-
-    def __repr__(self) -> str:
-        return repr(self.item)
+    pairs = np.unique(dofs // 2)
+    out.links = [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in pairs]
+    where, past = (item, N, out.all_dofs), [item.start(), 0.0] if hasattr(item, "start") else []
+    for name in [name for name, (own, _) in OF_ITEMS.items() if hasattr(item, own)]:
+        setattr(out, name, partial(of_pairs, where, name))
+    if hasattr(item, "energy"):
+        name = "potential" if past else "potential_at"
+        setattr(out, name, partial(of_pairs, where, name))
+    if hasattr(item, "stiffness"):
+        out.changing = sparse.issparse(item.stiffness(zero, zero, 0.0, *past))
+    out.evolves = getattr(item, "evolves", True)
+    out.resists = hasattr(item, "damping") or not out.changing and (
+        hasattr(item, "force") or hasattr(item, "evaluate"))
+    try_force(out, layout.sizes[out.all_dofs].reshape(-1, 2))
+    return out
 
 
-class UserConstraint(BoundConstraint):
-    """The constraint of a user-defined item."""
-
-    def __init__(self, item: Any, layout: Layout) -> None:
-        self.item, self.moving, self.name, self._key = item, item.moving, item.name, item._key
-        zero = np.zeros(layout.N)
-        value = item.constraint(zero, 0.0)
-        m = len(require_finite(f"constraint(u, t) of {item!r}", value, (None,)))
-        self.equations = tuple(f"equation {k}" for k in range(m))
-        J = require_finite(f"jacobian(u, t) of {item!r}", self.jacobian(zero, 0.0), (m, layout.N))
-        u = everywhere(layout.sizes)
-        self.constant = self.tabled = is_table(
-            self.value, u, lambda s, t: self.value(zero, t) + s * (J @ u), np.abs(J) @ np.abs(u))
-        at_generic_displacements(partial(require_derivatives, self, layout.sizes), layout.sizes)
-
-    def value(self, u: Array, t: float) -> Array:
-        return np.asarray(self.item.constraint(u, t))
-
-    def jacobian(self, u: Array, t: float) -> Array:
-        if hasattr(self.item, "jacobian"):
-            found = self.item.jacobian(u, t)
-            return found.toarray() if sparse.issparse(found) else np.asarray(found)
-        return super().jacobian(u, t)
-
-    def curvature(self, u: Array, t: float,
-                  multipliers: Array) -> tuple[Array, Array, Array] | None:
-        if self.constant:
-            return None
-        rows = np.flatnonzero(np.any(self.jacobian(u, t) != 0.0, axis=0))
-
-        def pulled(x: Array) -> Array:
-            w = np.asarray(u, dtype=x.dtype).copy()
-            w[rows] = x
-            return multipliers @ self.jacobian(w, t)
-
-        H = derivative(pulled, u[rows])
-        i, j = np.nonzero(H)
-        return i, rows[j], H[i, j]
-
-    def __repr__(self) -> str:
-        return repr(self.item)
+def _array(function, u, t):
+    found = function(u, t)
+    return found.toarray() if sparse.issparse(found) else np.asarray(found)
 
 
-def _entries(what, matrix, N):
-    """Rows, columns and values of a matrix, checked."""
-    found = sparse.coo_array(matrix)
-    if found.shape != (N, N):
-        raise InputError(f"{what} must have the shape ({N}, {N}), got {found.shape}")
-    require_entries(what, found.row, found.col, found.data, N)
-    return found.row, found.col, found.data
+def constraint_of(item: Any, layout: Layout) -> BoundConstraint:
+    """The constraint of an item of displacements."""
+    out, zero = BoundConstraint(), np.zeros(layout.N)
+    out.of_item, out.moving, out.name, out._key = item, item.moving, item.name, item._key
+    vars(out)["value"] = partial(_array, item.constraint)
+    if hasattr(item, "jacobian"):
+        vars(out)["jacobian"] = partial(_array, item.jacobian)
+    m = len(require_finite(f"constraint(u, t) of {item!r}", out.value(zero, 0.0), (None,)))
+    out.equations = tuple(f"equation {k}" for k in range(m))
+    J = require_finite(f"jacobian(u, t) of {item!r}", out.jacobian(zero, 0.0), (m, layout.N))
+    u = everywhere(layout.sizes)
+    out.constant = out.tabled = is_table(
+        out.value, u, lambda s, t: out.value(zero, t) + s * (J @ u), np.abs(J) @ np.abs(u))
+    at_generic_displacements(partial(require_derivatives, out, layout.sizes), layout.sizes)
+    return out
 
 
 def user_parts(item: Any, layout: Layout, force: bool = True) -> list[Any]:
     """The force and the constraint that a bound item has; ``force`` False leaves out the first."""
     out: list[Any] = []
     if force and any(hasattr(item, name) for name in ("energy", "force", "mass", "evaluate")):
-        out.append(UserForce(item, layout))
+        out.append(force_of(item, layout))
     if hasattr(item, "constraint"):
-        out.append(UserConstraint(item, layout))
+        out.append(constraint_of(item, layout))
     return out

@@ -32,8 +32,9 @@ class Item(Immutable, Bound):
     * ``mass()``: contribution to the mass matrix, (N, N), between DOFs of one node,
     * with a memory: ``start()``, its history at rest, (k,), and ``evaluate(u, v, t, history, dt)``
       in place of the force, which returns the force and the history after an increment ``dt``. Then
-      ``energy(u, history)`` is what it stores, and derivatives have these arguments, as described
-      in :class:`~skfem_ancf.actions.forces.ForceElement`.
+      ``energy(u, history)`` is what it stores, and derivatives have these arguments,
+    * what else :class:`~skfem_ancf.actions.forces.ForceElement` describes, as ``mean_force`` and
+      ``corrected``, with displacements in place of positions.
 
     Here u and v are displacement and velocity of all DOFs of the scene, shape (N,), and t is the
     time, in statics the load factor. Differences take complex steps, exact to round-off, where the

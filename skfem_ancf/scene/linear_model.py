@@ -98,6 +98,9 @@ class LinearModel:
             warn(f"a linear model has the stiffness at once of {relaxing[0]!r}, which relaxes in "
                  "time: it is right where all is fast beside that. A motion has all of it, by "
                  "integrate(...) with a load of the frequency in question", ModelWarning)
+        refuse(not inputs or not sensors, "a linear model has inputs, as [PointForce((0, 1), at="
+               "(1, 0))], and outputs, as scene.sensor('tip', 'displacement', at=(1, 0)), got {} "
+               "and {}", [name for name, *_ in inputs], [name for name, _ in sensors])
         columns = [(name, _columns(system, state, *item)) for name, *item in inputs]
         self.inputs = [label for name, c in columns for label in _labels(name, len(c))]
         self.B, self.G, self.prescribed = (

@@ -26,7 +26,7 @@ class ForceElement(BoundForce, Item):
     """Forces on points and sections of beams as functions of positions, velocities and time.
 
     A user-defined element, for :meth:`skfem_ancf.Scene.add`, is a subclass that defines
-    :meth:`bind` and :meth:`force`, and optionally :meth:`potential`, :meth:`stiffness` and
+    :meth:`bind` and :meth:`force` or :meth:`potential`, and optionally :meth:`stiffness` and
     :meth:`resistance`. In statics velocities are zero. Load factors do not scale it. The
     energy-momentum scheme conserves the energy if there is a :meth:`potential`; the work of
     velocity-dependent forces is in ``history.dissipated``.

@@ -13,7 +13,7 @@ from ...core import Array
 from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
-from ..bound import BoundForce, Remembering, UserForce, is_like, positions, recalled
+from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
 from .inertia import RotatingFrame
 from .kernels import (ACCEPTING, ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHED_BACK, PUSHING,
@@ -209,9 +209,10 @@ class Forces:
     def acting_rows(self, u: Array, t: float) -> tuple[Array, Array]:
         """Derivatives of positions of concentrated elements, and forces of items, (k, N) each."""
         rows, own, N = [], [np.zeros((0, self._N))], self._N
-        known = {id(getattr(e, "element", e)): e for e in self.custom}
+        known = {id(getattr(e, "element", e)): e for e in (*self.custom,
+                                                           *(e for e, _ in self.changing))}
         for element in self.elements:
-            if not isinstance(element, UserForce):
+            if element.of_item is None:
                 if not (element.distributed or element.internal):
                     rows += [link.row(n, N) for link in element.links for n in np.eye(2)]
                 continue

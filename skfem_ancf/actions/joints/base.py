@@ -29,8 +29,9 @@ class Joint(BoundConstraint, Item):
     degrees of freedom. The multipliers are the constraint forces (or moments), in the order of
     :attr:`equations`. A user-defined joint, for :meth:`skfem_ancf.Scene.add`, is a subclass that
     sets :attr:`equations` and defines :meth:`bind` and :meth:`value`; :meth:`jacobian` or
-    :meth:`entries`, by default differences; and :meth:`curvature` if the Jacobian depends on u. It
-    may have forces too, as any :class:`~skfem_ancf.Item`: an energy, a force, a memory, a mass.
+    :meth:`entries`, and :meth:`curvature`, both by default differences. Set ``constant = False`` if
+    the Jacobian depends on u. It may have forces too, as any :class:`~skfem_ancf.Item`: an energy,
+    a force, a memory, a mass.
 
     Attributes
     ----------
@@ -75,8 +76,8 @@ class Joint(BoundConstraint, Item):
             bound.bind(layout)
             bound._freeze()
             return [bound]
-        hint = ("a joint defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, "
-                "multipliers) unless that is constant")
+        hint = ("a joint defines bind(scene) and value(u, t), and sets constant = False where the "
+                "derivative of that is not")
         with explained("{!r} fails in the reference configuration", hint, InputError, self):
             bound.bind(layout)
             bound._freeze()
