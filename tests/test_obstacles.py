@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 from scipy.linalg import null_space
+from scipy.sparse import csr_array
 
 from skfem_ancf import (Beam, CallbackError, ElementBeamANCF, ElementBeamCable, InputError,
                         MeshBeam, ModelWarning, RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf.actions.contact.kernels import of_contacts
+from skfem_ancf.actions.contact.tables import FORCE, Request
 from skfem_ancf.actions.obstacles import Circle, Line, Polygon, SignedDistance
 from skfem_ancf.dynamics import GeneralizedAlpha
 
@@ -45,6 +48,35 @@ def test_the_distance_of_a_polygon_is_that_of_its_nearest_point():
     from matplotlib.path import Path
     inside = Path(corners).contains_points(points.T)
     assert np.allclose(shape.distance(points), np.where(inside, -nearest, nearest), atol=1e-3)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+@pytest.mark.parametrize("slip", [1e-6, 1e-4], ids=["little", "much"])
+@pytest.mark.parametrize("shape", [
+    Circle((0.5, -0.005), 0.005), Polygon([(0.45, -0.1), (0.5, 0.0), (0.4, -0.1)], 0.004)],
+    ids=repr)
+def test_stiffness_of_friction_on_round_shapes(shape, slip, element):
+    """Where a surface turns, so does the way from the anchor, of points as deep as may be."""
+    system = Scene(beam(element, height=0.02, E=1e7)).obstacle(shape, friction=0.3).system
+    contacts, b = system.forces.contacts, system.beams[0]
+    size = np.tile(np.where(np.arange(b.nd) < 2, 1.0, 10.0), system.N // b.nd)
+    u = 1e-6 * size * np.cos(np.arange(system.N))
+    u[1::b.nd] += 0.01 - 2e-4
+    contacts.begin(u, 0.0, True)
+    u[::b.nd] += slip
+    d = size * np.random.default_rng(0).standard_normal(system.N)
+
+    def force(u):
+        out = np.zeros(len(u))
+        of_contacts(contacts.tables, Request(FORCE, 0.0, 0.0, 0.0, 0, 0), u, u, out)
+        return out
+
+    s = 1e-8
+    change = (force(u + s * d) - force(u - s * d)) / (2 * s)
+    i, j, values = contacts.entries(0.0, u, system.bandwidth)
+    slope = csr_array((values, (i, j)), shape=(system.N, system.N)) @ d
+    assert np.abs(change).max() > 0.0
+    assert np.allclose(slope, change, rtol=0, atol=1e-7 * np.abs(change).max())
 
 
 # statics

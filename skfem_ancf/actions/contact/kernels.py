@@ -19,8 +19,8 @@ from ...core import C1, F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
 from .active_set import near_points, project, relative_travel, search, selected, touching
 from .gap import SHORT, TINY, carried, distances, outside, placed
-from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_slope,
-                   return_mapping, slip_of)
+from .laws import (damping_loss, from_anchor, mean_pressure, mean_pressure_slope, pressure_slope,
+                   return_mapping)
 from .plane import cross, dot, scaled, turned, vector
 from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, ANCHORS, AREA, AUGMENT, BEGIN, BILATERAL,
                      DAMPED_TANGENT, DAMPING, END, FOLLOWED, FORCE, FRICTION, LARGEST,
@@ -193,22 +193,26 @@ def respond(pair, same, p, force, missing, K, pressure):
         way = p.moved[i] - scaled(dot(across, p.turns[i]), u)
         square = dot(p.moved[i], p.moved[i]) + dot(p.turns[i], p.turns[i])
         missing[i] = P * (b - a + dot(n, way)) * (square > close) / np.maximum(square, TINY)
-        T, stick, change = 0.0, 0.0, 0.0
+        x, y, xx, xy, yy = n.real, n.imag, p.bend[0, i], p.bend[1, i], p.bend[2, i]
+        T, to_x, to_y, change = 0.0, 0.0, 0.0, 0.0
         if friction > 0.0:
-            slip = slip_of(pair.poses[NOW], n.real, n.imag, p.last[i].real, p.last[i].imag,
-                           memory[ANCHOR_X, m], memory[ANCHOR_Y, m])
-            k = sticking * area
+            aside, up = from_anchor(pair.poses[NOW], p.last[i].real, p.last[i].imag,
+                                    memory[ANCHOR_X, m], memory[ANCHOR_Y, m])
+            slip, k = up * x - aside * y, sticking * area
             trial = k * (slip + extrapolates * (slip - memory[SLIP, m]))
             T, sticks = return_mapping(trial, friction * P)
             sticks = np.maximum(sticks, all_stick)
             change = friction * np.sign(trial) * (1.0 - sticks) * c
-            stick = (1.0 + extrapolates if same else 2.0) * k * sticks
+            # the slip changes along the surface, and as that turns, in a mean by half of it
+            turning = (1.0 + extrapolates) * k * sticks
+            stick = turning if same else 2.0 * turning
+            to_x = turning * (xx * up - xy * aside) - stick * y
+            to_y = turning * (xy * up - yy * aside) + stick * x
         pressure[i], force[i] = P, scaled(-P, n) + scaled(T, turned(n))
-        x, y, xx, xy, yy = n.real, n.imag, p.bend[0, i], p.bend[1, i], p.bend[2, i]
-        K[0, i] = c * x * x - P * xx + stick * y * y + change * x * y - T * xy
-        K[1, i] = (c - stick) * x * y - P * xy + change * y * y - T * yy
-        K[2, i] = (c - stick) * x * y - P * xy - change * x * x + T * xx
-        K[3, i] = c * y * y - P * yy + stick * x * x - change * x * y + T * xy
+        K[0, i] = c * x * x - P * xx - to_x * y + change * x * y - T * xy
+        K[1, i] = c * x * y - P * xy - to_y * y + change * y * y - T * yy
+        K[2, i] = c * x * y - P * xy + to_x * x - change * x * x + T * xx
+        K[3, i] = c * y * y - P * yy + to_y * x - change * x * y + T * xy
 
 
 @source
@@ -248,8 +252,9 @@ def _settle(pair, same, p, pressure, out):
     extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
     for i in indices(lost.size):
         m, n, last = p.at[i], p.normal[i], p.last[i]
-        slip = slip_of(pose, n.real, n.imag, last.real, last.imag, memory[ANCHOR_X, m],
-                       memory[ANCHOR_Y, m])
+        aside, up = from_anchor(pose, last.real, last.imag, memory[ANCHOR_X, m],
+                                memory[ANCHOR_Y, m])
+        slip = up * n.real - aside * n.imag
         k, limit, (u, across) = sticking * pair.points[AREA, m], friction * pressure[i], lever(
             pair, p, i)
         gone = cross(n, p.moved[i] - scaled(dot(across, p.turns[i]), u))

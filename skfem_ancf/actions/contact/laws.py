@@ -55,11 +55,11 @@ def return_mapping(trial, limit):
 
 
 @source
-def slip_of(pose, nx, ny, x, y, anchor_x, anchor_y):
-    """Distance of a point from its anchor along the surface."""
-    p, q, cos, sin = x - pose[0] - anchor_x, y - pose[1] - anchor_y, pose[2] - 1.0, pose[3]
-    a, b = anchor_x - pose[4], anchor_y - pose[5]
-    return (q - sin * a - cos * b) * nx - (p - cos * a + sin * b) * ny
+def from_anchor(pose, x, y, anchor_x, anchor_y):
+    """The way of a point from its anchor, which moves with the obstacle."""
+    cos, sin, a, b = pose[2] - 1.0, pose[3], anchor_x - pose[4], anchor_y - pose[5]
+    return (x - pose[0] - anchor_x - cos * a + sin * b,
+            y - pose[1] - anchor_y - sin * a - cos * b)
 
 
 @source

@@ -555,6 +555,7 @@ def pair_stiffness(t, z0, z1, same, facets, zeta, K):
     G, S, turns = np.empty((COMPONENTS, n)), np.empty((COMPONENTS, n)), np.zeros((COMPONENTS, n))
     M, unit, across = np.empty((COMPONENTS, n)), np.zeros((COMPONENTS, n)), np.zeros(
         (COMPONENTS, n))
+    ways = np.zeros((COMPONENTS, n))
     for i in indices(n):
         p, e = met.at[i], met.e[i]
         facets[p], zeta[p] = e, met.zeta[i]
@@ -569,10 +570,12 @@ def pair_stiffness(t, z0, z1, same, facets, zeta, K):
         # curvature of the gap: of the facet, of its turns and of the point along it
         bend = 0.5 * (along(f0.curve, e, met.zeta[i])[2] + along(f1.curve, e, met.zeta[i])[2])
         length, short = size(v[3]), size(v[1])
-        outer, d = side * 1j * v[3] / length, v[1] / short
+        way, d = v[3] / length, v[1] / short
+        outer = side * 1j * way
         depth, curl, square = dot(outer, v[0] + 1j * s * d - v[2]), dot(outer, bend), length**2
         share = length / (square - depth * curl)
         turns[6, i], turns[7, i] = outer.real, outer.imag
+        ways[6, i], ways[7, i] = way.real, way.imag
         _put(M, i, (share * row[0], share * row[1], share * row[2], share * row[3]))
         unit[2, i], unit[3, i] = d.real / short, d.imag / short
         across[2, i], across[3, i] = -unit[3, i], unit[2, i]
@@ -580,17 +583,27 @@ def pair_stiffness(t, z0, z1, same, facets, zeta, K):
         if friction > 0.0:
             force, sticks, _ = rubbing(t, f1, p, e, k, friction * k * mean * met.share[i])
         change = friction * np.sign(force) * (1.0 - sticks) * slope
-        both, bent, load = s * dot(outer, d), s * dot(outer, 1j * d), k * mean
+        load = k * mean
+        push = load * outer - force * way
+        both, bent = s * dot(push, d), s * dot(push, 1j * d)
+        # friction turns with the facet; the speed along it, 1 / share, changes the slip
+        turned_by, stretch, rub = depth / square, dot(way, bend), force / length
+        more = 1.0 + turned_by * curl
         for x in range(COMPONENTS):
-            w = depth / square * (turns[x, i] + curl * M[x, i])
-            by_g, by_s = slope * G[x, i] - change * S[x, i], twice * sticks * k * S[x, i]
-            by_turn, by_m = load * (M[x, i] - w), load * (curl * (M[x, i] - w) + turns[x, i])
-            by_unit, by_across = -load * both * across[x, i], load * (
-                bent * across[x, i] - both * unit[x, i])
+            held = twice * sticks * S[x, i]
+            slips, w = held * force * share, turned_by * (turns[x, i] + curl * M[x, i])
+            by_g = slope * G[x, i] - change * S[x, i] + rub * turns[x, i] - slips * curl / length
+            by_turn = load * (M[x, i] - w) + rub * G[x, i] + turned_by * (
+                slips * stretch - force * ways[x, i])
+            by_m = load * (curl * (M[x, i] - w) + turns[x, i]) + rub * curl * G[x, i] - force * (
+                more * ways[x, i] + turned_by * stretch * turns[x, i]) + slips * stretch * (
+                    2.0 * more - 1.0)
+            by_way = slips * more - force * turned_by * turns[x, i]
+            by_unit, by_across = -both * across[x, i], bent * across[x, i] - both * unit[x, i]
             for y in range(COMPONENTS):
                 K[COMPONENTS * x + y, i] = (
-                    by_g * G[y, i] + by_s * S[y, i] + by_turn * turns[y, i] + by_m * M[y, i]
-                    + by_unit * unit[y, i] + by_across * across[y, i])
+                    by_g * G[y, i] + held * k * S[y, i] + by_turn * turns[y, i] + by_m * M[y, i]
+                    + by_way * ways[y, i] + by_unit * unit[y, i] + by_across * across[y, i])
     return n
 
 
