@@ -17,12 +17,14 @@ from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .types import Array
+
+_T = TypeVar("_T")
 
 #: Warning filters are global: one thread at a time changes them.
 _FILTERS = RLock()
@@ -188,7 +190,7 @@ def shown(value: object) -> str:
 
 
 class _Shown:
-    """A value in the format of a message: ``{!r}`` is :func:`shown`."""
+    """A value in the format of a message: ``{!r}`` is :func:`shown`, ``{:g}`` of a list a tuple."""
 
     def __init__(self, value):
         self.value = value
@@ -197,6 +199,8 @@ class _Shown:
         return shown(self.value)
 
     def __format__(self, spec):
+        if spec and isinstance(self.value, (list, tuple, np.ndarray)):
+            return f"({', '.join(format(one, spec) for one in self.value)})"
         return format(self.value, spec)
 
 
@@ -204,6 +208,16 @@ def refuse(wrong: object, message: str, *values: Any, error: type[InputError] = 
     """Raise an error if something is wrong, with values in its message: ``{!r}`` shortens one."""
     if wrong:
         raise error(message.format(*map(_Shown, values)) if values else message)
+
+
+def refuse_any(wrong: Any, message: str, *values: Any,
+               error: type[InputError] = InputError) -> None:
+    """As :func:`refuse` for the first True of an array (n,): its number is ``{k}``; arrays among
+    the values, (..., n), are taken there."""
+    if np.any(wrong):
+        k = int(np.argmax(wrong))
+        raise error(message.format(*[_Shown(value[..., k].tolist() if isinstance(
+            value, np.ndarray) else value) for value in values], k=k))
 
 
 def _suggested(name, known):
@@ -229,8 +243,7 @@ def require_finite_scalar(name: str, value: Any) -> float:
         raise InputError(f"{name} is too large for a float: {shown(value)}") from None
     except (TypeError, ValueError):
         raise InputError(f"{name} must be a number, got {shown(value)}") from None
-    if not -np.inf < value < np.inf:
-        raise InputError(f"{name} must be finite, got {value!r}")
+    refuse(not -np.inf < value < np.inf, "{} must be finite, got {!r}", name, value)
     return value
 
 
@@ -243,17 +256,23 @@ def _is_real(value):
 def require_positive(name: str, value: object, unit: str = "") -> float:
     """A positive finite number; ``unit`` appears in the message."""
     value = require_finite_scalar(name, value)
-    if value <= 0.0:
-        raise InputError(f"{name} must be positive{unit and f' ({unit})'}, got {value!r}")
+    refuse(value <= 0.0, "{} must be positive{}, got {!r}", name, unit and f" ({unit})", value)
     return value
+
+
+def require_range(name: str, value: object, low: float, high: float) -> float:
+    """A number from ``low`` to ``high``."""
+    number = require_finite_scalar(name, value)
+    refuse(not low <= number <= high, "{} must lie in [{:g}, {:g}], got {!r}", name, low, high,
+           number)
+    return number
 
 
 def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
     """A finite number >= 0; ``energy`` explains why in the message."""
     number = require_finite_scalar(name, value)
-    if number < 0.0:
-        why = ": negative damping, mass or stiffness would feed energy in" if energy else ""
-        raise InputError(f"{name} must be zero or positive, got {number!r}{why}")
+    refuse(number < 0.0, "{} must be zero or positive, got {!r}{}", name, number,
+           ": negative damping, mass or stiffness would feed energy in" * energy)
     return number
 
 
@@ -319,25 +338,23 @@ FARTHEST = 1e100
 def require_moderate(name: str, array: Array) -> float:
     """The largest magnitude of coordinates of which squares and products do not overflow."""
     largest = float(np.abs(array).max(initial=0.0))
-    if largest > FARTHEST or 0.0 < largest < 1.0 / FARTHEST:
-        raise InputError(f"{name} must have coordinates between {1.0 / FARTHEST:g} and "
-                         f"{FARTHEST:g}, got {largest:g}")
+    refuse(largest > FARTHEST or 0.0 < largest < 1.0 / FARTHEST, "{} must have coordinates between "
+           "{:g} and {:g}, got {:g}", name, 1.0 / FARTHEST, FARTHEST, largest)
     return largest
 
 
 def require_direction(name: str, value: Any) -> Array:
     """A vector (2,) that is not zero."""
     vector = require_finite(name, value, (2,))
-    if not vector.any():
-        raise InputError(f"{name} must not be zero, got {shown(value)}: give a vector, as (0, 1)")
+    refuse(not vector.any(), "{} must not be zero, got {!r}: give a vector, as (0, 1)", name, value)
     return vector
 
 
 def require_increasing(name: str, values: Any) -> Array:
     """Finite numbers (n,), n >= 1, each larger than the one before."""
     array = require_finite(name, values, (None,))
-    if not len(array) or (array[1:] <= array[:-1]).any():
-        raise InputError(f"{name} must be numbers that increase, at least one, got {shown(values)}")
+    refuse(not len(array) or (array[1:] <= array[:-1]).any(),
+           "{} must be numbers that increase, at least one, got {!r}", name, values)
     return array
 
 
@@ -371,9 +388,8 @@ def is_masked(value: object) -> bool:
 
 def require_unmasked(name: str, value: Any) -> None:
     """Raise InputError for masked values."""
-    if is_masked(value):
-        raise InputError(f"{name} has masked values: remove them with numpy.ma.compressed, or "
-                         "replace them with numpy.ma.filled")
+    refuse(is_masked(value), "{} has masked values: remove them with numpy.ma.compressed, or "
+           "replace them with numpy.ma.filled", name)
 
 
 #: Largest relative error of a derivative, compared with the difference quotient.
@@ -432,22 +448,30 @@ def require_text(name: str, value: Any) -> Any:
 
 def require_label(name: str, value: object) -> str | None:
     """As :func:`require_text`, but not empty."""
-    if isinstance(value, str) and not value:
-        raise InputError(f"{name} must be a text, or None for none, got ''")
+    refuse(isinstance(value, str) and not value, "{} must be a text, or None for none, got ''",
+           name)
     return require_text(name, value)
 
 
 def require_flag(name: str, value: object) -> bool:
     """True or False."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name} must be True or False, got {shown(value)}")
+    refuse(not isinstance(value, (bool, np.bool_)), "{} must be True or False, got {!r}", name,
+           value)
     return bool(value)
 
 
 def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
     """An instance with these attributes; ``kind`` is its name in the message."""
-    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
-        raise InputError(f"{name} must be a {kind}, got {shown(value)}")
+    refuse(isinstance(value, type) or not all(hasattr(value, a) for a in attributes),
+           "{} must be a {}, got {!r}", name, kind, value)
+    return value
+
+
+def require_kind(name: str, value: Any, kind: type[_T], hint: str = "") -> _T:
+    """An instance of a class; ``hint`` follows its name in the message, as ", or None"."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise InputError(f"{name} must be {article} {kind.__name__}{hint}, got {shown(value)}")
     return value
 
 
@@ -469,10 +493,8 @@ def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
             raise ValueError
     except (TypeError, ValueError):  # UnicodeEncodeError too, for lone surrogates
         raise InputError(f"{name} must be the path of a file, got {shown(value)}") from None
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise InputError("the file name must end with "
-                         f"{'one of ' if len(suffixes) > 1 else ''}{', '.join(suffixes)}, got "
-                         f"{str(value)!r}")
+    refuse(suffixes and path.suffix.lower() not in suffixes, "the file name must end with {}{}, "
+           "got {!r}", "one of " * (len(suffixes) > 1), ", ".join(suffixes), str(value))
     return path
 
 
@@ -480,8 +502,7 @@ def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
 
 def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
     """A callable; ``returns`` is a phrase such as "of time that returns a number"."""
-    if not callable(value):
-        raise InputError(f"{name} must be a function {returns}, got {shown(value)}")
+    refuse(not callable(value), "{} must be a function {}, got {!r}", name, returns, value)
     return value
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from .errors import InputError, require_finite, require_integer, shown
+from .errors import InputError, refuse, require_finite, require_integer, shown
 from .immutable import read_only
 from .types import Array, Rule
 
@@ -67,8 +67,7 @@ def product_rule(axis: Rule, section: Rule) -> Rule:
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
     """Lagrange polynomials of nodes (n,) at points (m,), shape (m, n)."""
     nodes, x = np.asarray(nodes, dtype=float), np.asarray(x, dtype=float)
-    if len(set(nodes.tolist())) < nodes.size:
-        raise InputError(f"nodes must be different, got {shown(nodes)}")
+    refuse(len(set(nodes.tolist())) < nodes.size, "nodes must be different, got {!r}", nodes)
     out = np.empty((x.size, nodes.size))
     out[:] = 1.0
     for i, a in enumerate(nodes):

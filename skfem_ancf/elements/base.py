@@ -421,10 +421,10 @@ class ElementBeam(Immutable, Element):
         """
         if mesh.is_straight:
             return mesh
-        if self.section.number and self.axis_degree > 3 and self._along[0] != self._along[1]:
-            raise MeshError(
-                f"{self!r} is for straight meshes: axis and sections of a curved one are of one "
-                "degree. Use ElementBeamANCF, ElementBeamANCFHermite or ElementBeamCable")
+        refuse(self.section.number and self.axis_degree > 3 and self._along[0] != self._along[1],
+               "{!r} is for straight meshes: axis and sections of a curved one are of one degree. "
+               "Use ElementBeamANCF, ElementBeamANCFHermite or ElementBeamCable", self,
+               error=MeshError)
         return mesh.with_sections(self.mesh_sections)
 
     @property
@@ -440,10 +440,9 @@ class ElementBeam(Immutable, Element):
         MeshError
             If the mesh is curved and its ``sections`` are not those of the element.
         """
-        if mesh.sections != self.mesh_sections and not mesh.is_straight:
-            raise MeshError(f"the sections of {self!r} are {self.mesh_sections}, those of the "
-                            f"curved mesh {mesh.sections}: use "
-                            f"mesh.with_sections({self.mesh_sections!r})")
+        refuse(mesh.sections != self.mesh_sections and not mesh.is_straight, "the sections of "
+               "{!r} are {}, those of the curved mesh {}: use mesh.with_sections({!r})", self,
+               self.mesh_sections, mesh.sections, self.mesh_sections, error=MeshError)
         known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y}
         if mesh.p_XY is not None:
             known[1, 1] = mesh.p_XY

@@ -42,7 +42,7 @@ from skfem.helpers import dot
 from ..actions.energy import Energy, points_of
 from ..beam.kinematics import element_dofs
 from ..beam import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
-from ..core import (Array, ArrayLike, InputError, ask_field, refuse, require_finite, require_like,
+from ..core import (Array, ArrayLike, ask_field, refuse, require_finite, require_like,
                     require_positive)
 from ..formulations import get_formulation
 from ..materials.base import Material
@@ -497,12 +497,10 @@ class _BeamForm:
         if last[0] is not r:
             last = self._last = r, self._contributions(r.basis, r=r.q)
         found, number = last[1], {id(f[0]): k for k, f in enumerate(r.basis.basis)}
-        try:
-            for function in reversed(functions):  # rows of v, columns of u
-                found = found[:, number[id(function)]]
-        except KeyError:
-            raise InputError("the position belongs to another basis: assemble the form on the "
-                             "basis that forms.position has") from None
+        for function in reversed(functions):  # rows of v, columns of u
+            refuse(id(function) not in number, "the position belongs to another basis: assemble "
+                   "the form on the basis that forms.position has")
+            found = found[:, number[id(function)]]
         return (found / r.basis.dx.sum(axis=1))[:, None] + np.zeros(r.basis.dx.shape)
 
     def _contributions(self, basis, r=None, idx=None, **other):
@@ -517,10 +515,9 @@ class _BeamForm:
         refuse(not same, "this is a form of {!r}: assemble it on Basis(beam.mesh, "
                "ElementVector(beam.element)), not on {!r}", self.beam, basis)
         r = r.q if isinstance(r, Position) else r
-        if other or isinstance(r, DiscreteField) or np.shape(r) != (basis.N,):
-            raise InputError(f"pass the degrees of freedom as r=q, a vector of {basis.N} numbers, "
-                             f"and nothing else; got r of shape {np.shape(r)}"
-                             + (f" and {sorted(other)}" if other else ""))
+        refuse(other or isinstance(r, DiscreteField) or np.shape(r) != (basis.N,), "pass the "
+               "degrees of freedom as r=q, a vector of {} numbers, and nothing else; got r of "
+               "shape {}{}", basis.N, np.shape(r), f" and {sorted(other)}" if other else "")
         found = self._found(np.asarray(r, dtype=np.float64) - self.beam.q0)
         return found if basis.tind is None else found[basis.tind]
 

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, Immutable, InputError, Law, Rule, cached_property, gauss,
-                    product_rule, read_only, refuse, require_finite_scalar, require_like,
-                    require_option, stress_of)
+from ..core import (Array, Immutable, Law, Rule, cached_property, gauss, product_rule, read_only,
+                    refuse, require_like, require_not_negative, require_option, stress_of)
 from ..elements.base import ElementBeam
 from ..materials import LinearLaw, Material
 from ..materials.history import AtRest
@@ -156,11 +155,10 @@ AXIS = (np.array([0.5]), np.array([1.0]))
 def split_moduli(name: str, material: Material, element: ElementBeam) -> tuple[Array, Array]:
     """Moduli diag(E, E, k_s G) without Poisson coupling, and the rest of D, (3, 3) both."""
     require_like("material", material, "Material", "law")
-    law = material.law(material.shear_factor(element))
-    if not isinstance(law, LinearLaw) or isinstance(law, AtRest):
-        raise InputError(
-            f"formulation {name!r} needs constant moduli, which {type(material).__name__} does not "
-            "have: use StVenantKirchhoff, or another formulation")
+    law: Any = material.law(material.shear_factor(element))
+    refuse(not isinstance(law, LinearLaw) or isinstance(law, AtRest), "formulation {!r} needs "
+           "constant moduli, which {} does not have: use StVenantKirchhoff, or another "
+           "formulation", name, type(material).__name__)
     uncoupled = np.diag([material.E, material.E, law.D[2, 2]])
     return uncoupled, law.D - uncoupled
 
@@ -272,9 +270,7 @@ class Assumed(Formulation):
     name = "assumed"
 
     def __init__(self, alpha: float = 1.0) -> None:
-        self.alpha = require_finite_scalar("alpha", alpha)
-        if self.alpha < 0.0:
-            raise InputError(f"alpha must not be negative, got {alpha!r}")
+        self.alpha = require_not_negative("alpha", alpha, False)
 
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         _, section = self.full_rules(element, material)
@@ -285,11 +281,9 @@ class Assumed(Formulation):
         law = material.law(factor)
         whole = Term(law, axis, section, samples)
         locks = isinstance(law, AtRest) and material.plane == "strain" and material.nu > NEAR
-        if locks and element.order > 0 and sampling.volume:
-            raise InputError(
-                f"{type(material).__name__} has a history, and linear sections lock in plane "
-                f"strain as nu goes to 1/2, by 2 % at {NEAR:g}: nu is {material.nu:g}. Use "
-                "ElementBeamANCFCubic(2), or a cable")
+        refuse(locks and element.order > 0 and sampling.volume, "{} has a history, and linear "
+               "sections lock in plane strain as nu goes to 1/2, by 2 % at {:g}: nu is {:g}. Use "
+               "ElementBeamANCFCubic(2), or a cable", type(material).__name__, NEAR, material.nu)
         if element.order > 1:
             laws = material.volumetric_split(factor) if sampling.volume else None
             if laws is None:

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, CallbackError, FileError, MeshError, ask_array, gauss, require_finite,
-                    require_finite_scalar, require_integer, require_path, warnings_as_errors)
+from ..core import (Array, CallbackError, FileError, MeshError, ask_array, gauss, refuse,
+                    refuse_any, require_finite, require_finite_scalar, require_integer,
+                    require_path, warnings_as_errors)
 
 # a smooth axis through points from an array or a text file
 
@@ -37,23 +38,20 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
         if lines and any(letter.isalpha() and letter not in "eE" for letter in lines[0]):
             lines = lines[1:]
         try:
-            rows = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None, ndmin=2,
-                              quotechar='"')
+            points = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None,
+                                ndmin=2, quotechar='"')
         except ValueError as error:
             raise MeshError(f"{path} must hold rows of two numbers, x and y: {error}") from None
-        if rows.shape[1] != 2:
-            raise MeshError(f"{path} must hold rows of two numbers, x and y; it has "
-                            f"{rows.shape[1]} columns")
-        points = rows
+        refuse(points.shape[1] != 2, "{} must hold rows of two numbers, x and y; it has {} columns",
+               path, points.shape[1], error=MeshError)
     x = require_finite("points", points, (None, 2))
     noise, n = require_finite_scalar("noise", noise), len(x)
-    if n < 2 or noise < 0:
-        raise MeshError(f"an axis needs at least two points, got {n}" if n < 2 else
-                        f"noise must not be negative, got {noise!r}")
+    refuse(n < 2, "an axis needs at least two points, got {}", n, error=MeshError)
+    refuse(noise < 0, "noise must not be negative, got {!r}", noise, error=MeshError)
     steps = np.hypot(*np.diff(x, axis=0).T)
-    k = int(np.argmin(steps))
-    if not steps[k] > CLOSE * np.max(steps):  # the spline would turn between them
-        raise MeshError(f"the points {k} and {k + 1} are both at {x[k].tolist()}: leave one out")
+    # the spline would turn between points so close
+    refuse_any(steps <= CLOSE * np.max(steps), "the points {k} and {} are both at {}: leave one "
+               "out", np.arange(1, n), x[:-1].T, error=MeshError)
     s = np.append(0.0, np.cumsum(steps))
     (t, c, k), _ = splprep(x.T, u=s, s=n * noise**2, k=min(3, n - 1))
     curve = BSpline(t, np.array(c), k, axis=1)
@@ -111,9 +109,8 @@ class Curve:
         """The derivative at parameters s, checked to be nonzero."""
         d = self.rate(s)
         size = np.hypot(*d)
-        if len(s) and size.min() <= 1e-12 * size.max():
-            raise MeshError("the curve has no tangent: its derivative is zero at s = "
-                            f"{s[np.argmin(size)]:.9g}")
+        refuse_any(size <= 1e-12 * size.max(initial=0.0), "the curve has no tangent: its "
+                   "derivative is zero at s = {:.9g}", s, error=MeshError)
         return d
 
     def nodes(self, s: Array) -> tuple[Array, Array]:
@@ -145,12 +142,9 @@ class Curve:
         here, d_gauss, d_fine = _each(self._moving, s, gauss, fine)
         lengths = np.hypot(*d_gauss) @ w * step
         gap = np.hypot(*(d_gauss @ w * step - np.diff(p))) / lengths
-        k = int(np.argmax(gap))
-        if not gap[k] <= 0.02:
-            raise MeshError(
-                f"r jumps, or its derivative does not fit, between s = {s[k]:.9g} and "
-                f"{s[k + 1]:.9g}: the integral of the derivative misses r by "
-                f"{gap[k] * lengths[k]:.6g}")
+        refuse_any(~(gap <= 0.02), "r jumps, or its derivative does not fit, between s = {:.9g} "
+                   "and {:.9g}: the integral of the derivative misses r by {:.6g}", a, s[1:],
+                   gap * lengths, error=MeshError)
         if len(s) > 2:
             chords = (p_beside - p[:, None, 1:-1]) * np.sign(ASIDE)[:, None]
             wide, narrow = _angles(chords[:, 0], chords[:, 1]), _angles(chords[:, 2], chords[:, 3])
@@ -158,12 +152,9 @@ class Curve:
             chord = np.hypot(*chords[:, 2:]).min(axis=0)
             seen = chord * KINK > 32.0 * np.finfo(float).eps * np.abs(p[:, 1:-1]).max()
             kink = np.where(seen & (np.abs(narrow) > 0.7 * np.abs(wide)), np.abs(narrow), 0.0)
-            k = int(np.argmax(kink))
-            if kink[k] > KINK:
-                raise MeshError(
-                    f"the curve has a kink of {np.rad2deg(narrow[k]):.3g} degrees at s = "
-                    f"{s[k + 1]:.9g}: give one beam for each smooth part, and weld them in a scene "
-                    'with scene.joint("weld", ...)')
+            refuse_any(kink > KINK, 'the curve has a kink of {:.3g} degrees at s = {:.9g}: give '
+                       'one beam for each smooth part, and weld them in a scene with '
+                       'scene.joint("weld", ...)', np.rad2deg(narrow), s[1:-1], error=MeshError)
         v = np.hypot(*d_fine)
         pieces = (v[:-2:2] + 4.0 * v[1::2] + v[2::2]) * np.repeat(step / 96.0, 16)  # Simpson's rule
         bent = np.abs(_angles(d_fine[:, :-2:2], d_fine[:, 2::2])) / pieces

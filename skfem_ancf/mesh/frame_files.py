@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (FileError, InputError, MeshError, refuse, require_finite, require_module,
-                    require_names, require_option, require_path, shown)
+from ..core import (MeshError, refuse, refuse_any, require_finite, require_kind, require_module,
+                    require_names, require_option, require_path)
+from ..core.archive import reading
 from .frame_graph import FrameGraph
 
 
@@ -33,11 +34,9 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
     import meshio
 
     ezdxf = require_module("ezdxf", "dxf")
-    try:
+    with reading(path, "drawing", OSError, ezdxf.DXFError):
         drawing = ezdxf.readfile(path)
         entities = list(drawing.modelspace())
-    except (OSError, ezdxf.DXFError) as error:
-        raise FileError(f"{path} cannot be read as a drawing: {error}") from error
     places: list[Any] = []  # two of each line, then one of each point
     lines, points = list[str](), list[tuple[str, Any]]()
     for entity in entities:
@@ -49,9 +48,9 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
                 lines.append(entity.dxf.layer)
             elif kind == "POINT":
                 points.append((entity.dxf.layer, part.dxf.location.xyz))
-            elif kind in CURVES:
-                raise MeshError(f"{path} has {kind} in the layer {entity.dxf.layer!r}, which is "
-                                "no straight line: explode blocks, and draw curves as polylines")
+            refuse(kind in CURVES, "{} has {} in the layer {!r}, which is no straight line: "
+                   "explode blocks, and draw curves as polylines", path, kind, entity.dxf.layer,
+                   error=MeshError)
     refuse(not lines, "{} has no lines and no polylines in its model space", path, error=MeshError)
     at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
     at = at * _scale(drawing.units, unit, path)
@@ -86,8 +85,8 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     """The graph of the line cells of a ``meshio.Mesh``, or of a file of meshio or DXF: see
     :meth:`skfem_ancf.Frame.from_meshio`. ``named`` are sets to which other arguments refer."""
     mesh = _mesh_of(mesh, unit)
-    if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
-        raise InputError(f"groups are names of sets of lines, got {shown(groups)}")
+    refuse(groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)),
+           "groups are names of sets of lines, got {!r}", groups)
     points = require_finite("the points of the mesh", mesh.points)
     kinds = {block.type for block in mesh.cells}
     odd = sorted(kind for kind in kinds if kind != "vertex" and not LINE.fullmatch(kind))
@@ -97,8 +96,8 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     blocks = {k: block for k, block in enumerate(mesh.cells) if LINE.fullmatch(block.type)}
     cells = [_ends_first(points, cell) for block in blocks.values()
              for cell in np.asarray(block.data, dtype=np.int64)]
-    if not cells:
-        raise MeshError(f"the mesh has no lines: its cells are {sorted(kinds) or 'none'}")
+    refuse(not cells, "the mesh has no lines: its cells are {}", sorted(kinds) or "none",
+           error=MeshError)
     # the same cell may be there once for each set that it is in
     number: dict[tuple[int, ...], int] = {}
     cell_number = np.array([number.setdefault(min(cell, cell[1::-1] + cell[:1:-1]), len(number))
@@ -107,11 +106,9 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     used, ends = np.unique([cell[:2] for cell in lines], return_inverse=True)
     if points.shape[1] > 2:
         inside = np.unique(np.concatenate(lines))
-        off = np.abs(points[inside, 2])
-        if np.max(off) > 1e-6 * np.max(np.ptp(points[inside, :2], axis=0)):
-            k = int(inside[np.argmax(off)])
-            raise MeshError(f"the point {k} of the mesh is at z = {points[k, 2]:.9g}: a frame lies "
-                            "in the plane z = 0")
+        x, y, z = points[inside].T
+        refuse_any(np.abs(z) > 1e-6 * max(np.ptp(x), np.ptp(y)), "the point {} of the mesh is at z "
+                   "= {:.9g}: a frame lies in the plane z = 0", inside, z, error=MeshError)
     curves = {k: partial(_polynomial, points[cell, :2].T) for k, cell in enumerate(lines)
               if len(cell) > 2}
     first = dict(zip(blocks, np.cumsum([0] + [len(b.data) for b in blocks.values()])))
@@ -136,17 +133,13 @@ def _mesh_of(mesh, unit):
         path = require_path("mesh", mesh)
         if path.suffix.lower() == ".dxf":
             return mesh_of_dxf(path, unit)
-        try:
+        with reading(path, "mesh", Exception, SystemExit):  # meshio exits on an unknown format
             mesh = meshio.read(path)
-        except (Exception, SystemExit) as error:  # meshio exits on an unknown format
-            raise FileError(f"{path} cannot be read as a mesh: {error}") from None
         if path.suffix.lower() == ".inp":
             _require_sets_of_abaqus(path)
     refuse(unit is not None, "unit={!r} is for drawings in DXF, which state theirs: other meshes "
            "are taken as they are", unit)
-    if not isinstance(mesh, meshio.Mesh):
-        raise InputError(f"mesh must be a meshio.Mesh or the name of a file, got {shown(mesh)}")
-    return mesh
+    return require_kind("mesh", mesh, meshio.Mesh, " of meshio or the name of a file")
 
 
 def _require_sets_of_abaqus(path):
@@ -161,16 +154,17 @@ def _require_sets_of_abaqus(path):
                 blocks.append(name)
             elif keyword == "*ELSET":
                 sets.append(name)
-        elif keyword == "*ELSET" and re.match(r"\s*[A-Za-z_]", line):
-            raise MeshError(f"{path}: the element set {sets[-1]!r} lists names of sets, which are "
-                            "not read: list the numbers of its elements")
+        elif keyword == "*ELSET":
+            refuse(re.match(r"\s*[A-Za-z_]", line), "{}: the element set {!r} lists names of sets, "
+                   "which are not read: list the numbers of its elements", path, sets[-1],
+                   error=MeshError)
     named = [name for name in blocks if name]
     again = sorted({name for name in named + sets if (named + sets).count(name) > 1})
-    if again or blocks[:len(named)] != named:
-        what = f"{again[0]!r} is there twice" if again else "a block has none before one that has"
-        raise MeshError(f"{path}: element sets are read if each has one place, at *ELSET or at an "
-                        f"*ELEMENT, ELSET=... before which others have names, too: {what}; write "
-                        "*ELSET with the numbers of all its elements")
+    refuse(again or blocks[:len(named)] != named, "{}: element sets are read if each has one "
+           "place, at *ELSET or at an *ELEMENT, ELSET=... before which others have names, too: {}; "
+           "write *ELSET with the numbers of all its elements", path,
+           f"{again[0]!r} is there twice" if again else "a block has none before one that has",
+           error=MeshError)
 
 
 def _ends_first(points, cell):
@@ -180,10 +174,9 @@ def _ends_first(points, cell):
     a, b, c = points[cell]
     if np.linalg.norm(c - a) > max(np.linalg.norm(b - a), np.linalg.norm(c - b)):
         return cell[[0, 2, 1]]
-    if np.linalg.norm(c - b) > np.linalg.norm(b - a):
-        raise MeshError(f"the line through the points {cell.tolist()} of the mesh does not have "
-                        "its middle between its ends: the order is end, end, middle, or in files "
-                        "of Abaqus end, middle, end")
+    refuse(np.linalg.norm(c - b) > np.linalg.norm(b - a), "the line through the points {} of the "
+           "mesh does not have its middle between its ends: the order is end, end, middle, or in "
+           "files of Abaqus end, middle, end", cell.tolist(), error=MeshError)
     return cell
 
 
@@ -225,9 +218,9 @@ def _entries(name, part, n):
         out = np.ravel(np.asarray(part))
     except ValueError:  # of sets
         out = np.zeros(1, dtype=object)
-    if len(out) and (out.dtype.kind not in "iu" or out.min() < 0 or out.max() >= n):
-        raise MeshError(f"the set {name!r} of the mesh must hold numbers from 0 to {n - 1}, got "
-                        f"{shown(part)}")
+    refuse(len(out) and (out.dtype.kind not in "iu" or out.min() < 0 or out.max() >= n), "the set "
+           "{!r} of the mesh must hold numbers from 0 to {}, got {!r}", name, n - 1, part,
+           error=MeshError)
     return out.astype(np.int64)
 
 

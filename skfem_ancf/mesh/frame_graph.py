@@ -11,7 +11,7 @@ import scipy
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..core import (Array, InputError, MeshError, ModelWarning, NameUnknown, ask_field, refuse,
+from ..core import (Array, InputError, MeshError, ModelWarning, ask_field, refuse, refuse_any,
                     require_finite, require_integer, require_label, require_moderate,
                     require_not_negative, require_option, require_unmasked, shown, warn)
 from .curve import Curve
@@ -165,33 +165,26 @@ class FrameGraph:
         self._merge(tol)
         self._require_lines()
         self.beams = tuple(self.groups) if beams is None else tuple(beams)
-        taken = np.zeros(m, dtype=int)
+        taken = np.full(m, -1)  # the number of the group of each line
         for name in self.beams:
             some = self.groups[name]
-            if np.any(taken[some]):
-                k = some[np.argmax(taken[some])]
-                first = next(other for other in self.beams if k in self.groups[other])
-                raise InputError(f"line {k} is in the groups {first!r} and {name!r}: a group is a "
-                                 "beam of its own, so a line is in one at most; of the sets of a "
-                                 "mesh groups= names those that are beams")
-            taken[some] = 1
-            if not np.any(np.isin(some, self.distinct)):
-                raise MeshError(f"all lines of the group {name!r} are shorter than tol = "
-                                f"{self.tol:.3g}, within which points are one node")
+            refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: a group is a "
+                       "beam of its own, so a line is in one at most; of the sets of a mesh "
+                       "groups= names those that are beams", some,
+                       np.array(self.beams)[taken[some]], name)
+            taken[some] = self.beams.index(name)
+            refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
+                   "shorter than tol = {:.3g}, within which points are one node", name, self.tol,
+                   error=MeshError)
 
     def _require_points(self):
         n, (a, b) = self.points.shape[1], self.lines
-        bad = np.flatnonzero((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n))
-        if len(bad):
-            k = int(bad[0])
-            raise MeshError(f"line {k} joins the points {self.lines[:, k].tolist()}, which are "
-                            f"numbered 0 to {n - 1}")
-        for k in np.flatnonzero(a == b):
-            raise MeshError(f"line {k} has no length: it joins the point {a[k]} to itself")
-        alone = np.setdiff1d(np.arange(n), self.lines)
-        if len(alone):
-            raise MeshError(f"the point {alone[0]} at {_at(self.points[:, alone[0]])} is in no "
-                            "line: remove it, or join it to another point")
+        refuse_any((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n), "line {k} joins the points "
+                   "{}, which are numbered 0 to {}", self.lines, n - 1, error=MeshError)
+        refuse_any(a == b, "line {k} has no length: it joins the point {} to itself", a,
+                   error=MeshError)
+        refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line: "
+                   "remove it, or join it to another point", self.points, error=MeshError)
 
     def _require_lines(self):
         key = np.sort(self.lines[:, self.distinct], axis=0)
@@ -278,27 +271,24 @@ class FrameGraph:
         require_unmasked("place", place)
         place = points_of_rows(place)
         if isinstance(place, str):
-            if place in self.lost:
-                raise MeshError(f"{place!r} contains the point {self.lost[place]} of the mesh, "
-                                "which is not an end of a line: a frame is supported and loaded at "
-                                "ends of lines")
+            refuse(place in self.lost, "{!r} contains the point {} of the mesh, which is not an "
+                   "end of a line: a frame is supported and loaded at ends of lines", place,
+                   self.lost.get(place), error=MeshError)
+            require_option("name of nodes", place, {**self.nodes, **self.groups})
             if place in self.nodes:
                 return self.nodes[place]
-            if place in self.groups:
-                return np.unique(self.given[:, self.groups[place]])
-            raise NameUnknown("name of nodes", place, {**self.nodes, **self.groups})
+            return np.unique(self.given[:, self.groups[place]])
         if is_point(place) and not isinstance(place, list):
             x = require_finite("the point", place, (2,))
             off = np.hypot(*(self.points - x[:, None]))
             k = int(np.argmin(off))
-            if off[k] > 1e3 * NEAR * self.size:
-                raise MeshError(f"no node of the frame is at {_at(x)}: the nearest is number {k} "
-                                f"at {_at(self.points[:, k])}")
+            refuse(off[k] > 1e3 * NEAR * self.size, "no node of the frame is at {:.9g}: the "
+                   "nearest is number {} at {:.9g}", x, k, self.points[:, k], error=MeshError)
             return np.array([k])
         if callable(place):
             chosen = satisfying(place, self.points, "nodes")
-            if not len(chosen):
-                raise MeshError(f"the function {place!r} selects none of the {n} nodes")
+            refuse(not len(chosen), "the function {!r} selects none of the {} nodes", place, n,
+                   error=MeshError)
             return chosen
         if isinstance(place, (list, tuple, set, frozenset)) and len(place) or (
                 isinstance(place, np.ndarray) and place.ndim == 1 and len(place)):
@@ -334,10 +324,9 @@ class FrameGraph:
             found = ask_field(f"the curve of line {number} of s",
                               lambda s, curve=curve: curve(s[0]),  # type: ignore[misc]
                               np.array([[0.0, 1.0]] * 2))
-            if np.max(np.abs(found - x)) > 1e3 * NEAR * self.size:
-                raise MeshError(f"the curve of line {number} runs from {_at(found[:, 0])} to "
-                                f"{_at(found[:, 1])}, its points are at {_at(x[:, 0])} and "
-                                f"{_at(x[:, 1])}: a curve is a function of s from 0 to 1")
+            refuse(np.max(np.abs(found - x)) > 1e3 * NEAR * self.size, "the curve of line {} runs "
+                   "from {:.9g} to {:.9g}, its points are at {:.9g} and {:.9g}: a curve is a "
+                   "function of s from 0 to 1", number, *found.T, *x.T, error=MeshError)
             arc = MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, int(n[k]) + 1),
                                       height[k] if isinstance(height, list) else height)
             p[:, nodes], tangent[:, nodes], turning[:, nodes] = arc.p, arc.p_X, arc.p_XY
@@ -351,8 +340,8 @@ class FrameGraph:
 
 def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:
     """A dict, or an empty one for None."""
-    if given is not None and not isinstance(given, Mapping):
-        raise InputError(f"{name} must be a dict, got {shown(given)}")
+    refuse(given is not None and not isinstance(given, Mapping), "{} must be a dict, got {!r}",
+           name, given)
     return given or {}
 
 
@@ -360,26 +349,23 @@ def _pairs(what, values):
     """Pairs in rows, as an array (2, n)."""
     rows = hasattr(values, "__iter__") and not isinstance(values, (np.ndarray, str, Mapping))
     found = require_finite(what, list(values) if rows else values)
-    if found.ndim != 2 or found.shape[1] != 2 or not len(found):
-        hint = "; give its transpose" if found.ndim == 2 and len(found) == 2 else ""
-        raise InputError(f"{what} are pairs, one at least: a list of pairs or an array of shape "
-                         f"(n, 2), got {shown(values)} of shape {found.shape}{hint}")
+    refuse(found.ndim != 2 or found.shape[1] != 2 or not len(found), "{} are pairs, one at least: "
+           "a list of pairs or an array of shape (n, 2), got {!r} of shape {}{}", what, values,
+           found.shape, "; give its transpose" * (found.ndim == 2 and len(found) == 2))
     return found.T
 
 
 def _named(kind, what, given, n):
     out = {}
     for name, numbers in mapping_of(f"{kind}s of {what}", given).items():
-        if require_label(f"a {kind} of {what}", name) is None:
-            raise InputError(f"a {kind} of {what} is a text, got None")
+        refuse(require_label(f"a {kind} of {what}", name) is None, "a {} of {} is a text, got None",
+               kind, what)
         found = require_finite(f"the numbers of {what} of {name!r}", numbers)
-        if found.ndim != 1 or not len(found) or np.any(found != np.floor(found)):
-            raise InputError(f"{name!r} must hold numbers of {what}, got {shown(numbers)}")
-        found = np.unique(found).astype(np.int64)
-        if found[0] < 0 or found[-1] >= n:
-            raise MeshError(f"{name!r} holds the number {found[0] if found[0] < 0 else found[-1]}: "
-                            f"the {what} are numbered 0 to {n - 1}")
-        out[name] = found
+        refuse(found.ndim != 1 or not len(found) or np.any(found != np.floor(found)),
+               "{!r} must hold numbers of {}, got {!r}", name, what, numbers)
+        out[name] = found = np.unique(found).astype(np.int64)
+        refuse_any((found < 0) | (found >= n), "{!r} holds the number {}: the {} are numbered 0 to "
+                   "{}", name, found, what, n - 1, error=MeshError)
     return out
 
 

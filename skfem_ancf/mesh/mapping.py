@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from skfem.mapping import Mapping
 
-from ..core import (Array, InputError, MeshError, ask_array, cached_property, hermite_basis,
-                    lagrange, require_function, require_positive, shown)
+from ..core import (Array, MeshError, ask_array, cached_property, hermite_basis, lagrange, refuse,
+                    refuse_any, require_positive)
 from .places import Inverse, InverseOfLines, with_slope
 
 #: Interpolation of sections with 1, 2, ... nodal derivatives along X, the 0th included.
@@ -34,28 +34,22 @@ def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
 def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:
     """Largest height, heights (4, ne) in the elements, and the function; None for a number."""
     if not callable(height):
-        if isinstance(height, (list, tuple)) or getattr(height, "ndim", 0) > 0:
-            raise InputError("height is a number, or a function of parameters (n,), got "
-                             f"{shown(height)}: for heights at nodes, height=lambda x: "
-                             "np.interp(x, nodes, heights)")
+        refuse(isinstance(height, (list, tuple)) or getattr(height, "ndim", 0) > 0, "height is a "
+               "number, or a function of parameters (n,), got {!r}: for heights at nodes, "
+               "height=lambda x: np.interp(x, nodes, heights)", height)
         return require_positive("height", height), None, None
-    require_function("height", height, "of parameters (n,) that returns heights (n,)")
     a, b = s[t]
     at = a + np.append(PLACES, BETWEEN)[:, None] * (b - a)
     found = ask_array("height(x)", (at.size,), height, at.ravel(), number=True)
     found = found.reshape(at.shape)
-    if not np.all(found > 0.0):
-        k = np.unravel_index(np.argmin(found), found.shape)
-        raise MeshError(f"the height of a beam is positive, the function returns {found[k]:.6g} "
-                        f"at {at[k]:.6g}: end the mesh before it gets thin there")
+    refuse_any(found.ravel() <= 0.0, "the height of a beam is positive, the function returns "
+               "{:.6g} at {:.6g}: end the mesh before it gets thin there", found.ravel(),
+               at.ravel(), error=MeshError)
     heights, between = found[:4].copy(), found[4:]
-    gap = np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between
-    if np.max(gap) > FITS:
-        e = int(np.argmax(np.max(gap, axis=0)))
-        raise MeshError(
-            f"the height is not smooth in element {e}, from {a[e]:.6g} to {b[e]:.6g}: a cubic "
-            f"polynomial differs by {np.max(gap):.1%}. Put a node at a kink, weld two beams at "
-            "a jump, or use more elements")
+    gap = np.max(np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between, axis=0)
+    refuse_any(gap > FITS, "the height is not smooth in element {k}, from {:.6g} to {:.6g}: a "
+               "cubic polynomial differs by {:.1%}. Put a node at a kink, weld two beams at a "
+               "jump, or use more elements", a, b, gap, error=MeshError)
     return float(np.max(heights)), heights, height
 
 
@@ -303,21 +297,14 @@ class MappingBeam(Mapping):
 
     def check(self) -> None:
         """Raise :class:`MeshError` where the body is too thin, or folds: not one to one."""
-        if self.mesh.heights is not None:
-            thin = np.min(self._relative(_FACES[0], None)[0], axis=1)
-            if np.min(thin) <= THIN:
-                k = int(np.argmin(thin))
-                raise MeshError(f"the height is zero to round-off in element {k}, which starts at "
-                                f"{self.mesh.p[:, self.mesh.t[0, k]].tolist()}: end the mesh "
-                                "before it gets thin there")
         m = self.mesh
+        if m.heights is not None:
+            thin = np.min(self._relative(_FACES[0], None)[0], axis=1) <= THIN
+            refuse_any(thin, "the height is zero to round-off in element {k}, which starts at {}: "
+                       "end the mesh before it gets thin there", m.p[:, m.t[0]], error=MeshError)
         least = m.lengths * m.height if m.is_straight and m.heights is None else (
             self.detDF(_FACES).min(axis=1))
-        if not least.min() > 0.0:
-            bad = np.nonzero(~(least > 0.0))[0]
-            at = self.mesh.p[:, self.mesh.t[0, bad[0]]]
-            raise MeshError(
-                f"the body folds in element {bad[0]}, which starts at ({at[0]:.6g}, {at[1]:.6g}): "
-                f"the radius of curvature is below half the height {self.mesh.height:.6g}, or the "
-                "elements are too long for the curve; use a smaller height, a gentler curve or "
-                "more elements")
+        refuse_any(~(least > 0.0), "the body folds in element {k}, which starts at {:.6g}: the "
+                   "radius of curvature is below half the height {:.6g}, or the elements are too "
+                   "long for the curve; use a smaller height, a gentler curve or more elements",
+                   m.p[:, m.t[0]], m.height, error=MeshError)

@@ -15,10 +15,10 @@ from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
 from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, StrPath,
-                    archive, cached_property, is_builtin, packed, refuse, require_finite,
-                    require_finite_scalar, require_function, require_integer, require_moderate,
-                    require_option, require_options, require_path, require_positive,
-                    require_unmasked, shown)
+                    archive, cached_property, is_builtin, packed, refuse, refuse_any,
+                    require_finite, require_finite_scalar, require_function, require_integer,
+                    require_moderate, require_option, require_options, require_path,
+                    require_positive, require_unmasked)
 from .curve import Curve, axis_of, derivative_of
 from .mapping import SECTIONS, MappingBeam, heights_of, scaled
 from .numbering import NODAL, ElementBeamP1, NumberedMesh, default_tags, halved
@@ -134,13 +134,9 @@ class MeshBeam(NumberedMesh):
         x = require_finite("x", x, (None,), "np.linspace(0, length, elements + 1)")
         origin = require_finite("origin", origin, (2,))
         angle = _radians(angle)
-        if len(x) < 2:
-            raise MeshError(f"a beam needs at least two nodes, got {len(x)}")
-        if not (x[1:] > x[:-1]).all():
-            k = int(np.argmin(np.diff(x)))
-            raise MeshError(
-                f"element {k} from x = {x[k]:.9g} to {x[k + 1]:.9g} has no positive length; the "
-                "nodes must increase along the axis")
+        refuse(len(x) < 2, "a beam needs at least two nodes, got {}", len(x), error=MeshError)
+        refuse_any(x[1:] <= x[:-1], "element {k} from x = {:.9g} to {:.9g} has no positive length; "
+                   "the nodes must increase along the axis", x[:-1], x[1:], error=MeshError)
         e1 = np.array([np.cos(angle), np.sin(angle)])
         p = origin[:, None] + e1[:, None] * x
         t = _chain(len(x))
@@ -180,10 +176,8 @@ class MeshBeam(NumberedMesh):
         """
         s = require_finite("s", s, (None,))
         refuse(len(s) < 2, "a beam needs at least two nodes, got {}", len(s), error=MeshError)
-        if not np.all(np.diff(s) > 0):
-            k = int(np.argmin(np.diff(s)))
-            raise MeshError(f"the parameters of the nodes must increase: s[{k}] = {s[k]:.9g}, "
-                            f"s[{k + 1}] = {s[k + 1]:.9g}")
+        refuse_any(s[1:] <= s[:-1], "the parameters of the nodes must increase: s[{k}] = {:.9g}, "
+                   "then {:.9g}", s[:-1], s[1:], error=MeshError)
         what = "of parameters (n,) that returns positions (2, n)"
         require_function("r", r, what)
         if dr is None:
@@ -195,11 +189,10 @@ class MeshBeam(NumberedMesh):
         # the curvature of each sixteenth of an element times half the height there
         h = (largest + 0.0 * lengths if heights is None else np.max(heights, axis=0)).repeat(16)
         k = int(np.argmax(bent * h))
-        if bent[k] * h[k] >= 2.0:
-            at = np.interp(k / 16.0, np.arange(len(s)), s)
-            raise MeshError(
-                f"the curve folds near s = {at:.6g}: its radius of curvature {1 / bent[k]:.6g} is "
-                f"below half the height {h[k] / 2:.6g}; use a smaller height or a gentler curve")
+        refuse(bent[k] * h[k] >= 2.0, "the curve folds near s = {:.6g}: its radius of curvature "
+               "{:.6g} is below half the height {:.6g}; use a smaller height or a gentler curve",
+               np.interp(k / 16.0, np.arange(len(s)), s), 1.0 / (bent[k] or np.inf), h[k] / 2,
+               error=MeshError)
         return cls._from_nodes(p, t, tangent, lengths, (largest, heights, taper), s.copy(), curve,
                                turning)
 
@@ -280,29 +273,27 @@ class MeshBeam(NumberedMesh):
         require_moderate("the nodes", p)
         if type(self.t) is not np.ndarray or self.t.dtype != np.int32:
             t = require_finite("t", self.t)
-            if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
-                raise MeshError(f"t must contain node numbers, got {shown(self.t)}")
+            refuse(np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1),
+                   "t must contain node numbers, got {!r}", self.t, error=MeshError)
         shape = np.shape(self.t)
         refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "a MeshBeam has two nodes per "
                "element and at least one element, t has shape {}; for quads use mesh.to_meshquad()",
                shape, error=MeshError)
         super().__post_init__()
-        if self.height is None:  # as Basis.refinterp makes it
-            raise MeshError(
-                "height must be a number, got None: build meshes of beams with MeshBeam.init_line "
-                "or init_curve. For a picture of a Basis take quad = mesh.to_meshquad() and "
-                "quad.plot(basis.probes(quad.p) @ y), not basis.plot or basis.refinterp")
+        # Basis.refinterp makes meshes without a height
+        refuse(self.height is None, "height must be a number, got None: build meshes of beams with "
+               "MeshBeam.init_line or init_curve. For a picture of a Basis take quad = "
+               "mesh.to_meshquad() and quad.plot(basis.probes(quad.p) @ y), not basis.plot or "
+               "basis.refinterp", error=MeshError)
         self.height = require_positive("height", self.height)
         t = self.t
-        if not ((t[1] == t[0] + 1).all() and (t[0, 1:] > t[0, :-1]).all()):
-            raise MeshError("the nodes of a MeshBeam are numbered along its axis: element k joins "
-                            "t[0, k] and t[0, k] + 1, and t[0] increases")
-        if (t[0, 0] or t[1, -1] != p.shape[1] - 1
-                or (t[0, 1:] > t[1, :-1] + 1).any()):  # the elements leave nodes out
-            odd = np.setxor1d(t, np.arange(p.shape[1]))
-            raise MeshError(f"every node of a MeshBeam is part of an element: there are "
-                            f"{p.shape[1]} nodes, and node {odd[0]} is only in "
-                            f"{'t' if odd[0] in t else 'the nodes'}")
+        refuse((t[1] != t[0] + 1).any() or (t[0, 1:] <= t[0, :-1]).any(), "the nodes of a MeshBeam "
+               "are numbered along its axis: element k joins t[0, k] and t[0, k] + 1, and t[0] "
+               "increases", error=MeshError)
+        odd = np.setxor1d(t, np.arange(p.shape[1]))
+        refuse_any(odd >= odd[:1], "every node of a MeshBeam is part of an element: there are {} "
+                   "nodes, and node {} is only in {}", p.shape[1], odd,
+                   np.where(np.isin(odd, t), "t", "the nodes"), error=MeshError)
         refuse(self.p_X is None, "a MeshBeam needs the tangents p_X of its axis, and more: build "
                "it with MeshBeam.init_line or init_curve", error=MeshError)
         for name, wanted in (("p_X", p.shape), ("p_Y", p.shape), ("p_XY", p.shape),
@@ -312,23 +303,20 @@ class MeshBeam(NumberedMesh):
                 found = require_finite(name, value, wanted)
                 if found is not value:
                     setattr(self, name, found)
-        if self.heights is not None and not np.all(self.heights > 0.0):
-            raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
+        refuse(self.heights is not None and np.any(self.heights <= 0.0),
+               "heights must be positive, got {!r}", self.heights, error=MeshError)
         require_option("interpolation of the sections", self.sections, SECTIONS)
-        if self.p_XY is None and self.sections != "linear":
-            raise MeshError("the mesh has no derivative p_XY of its directors: build it with "
-                            "MeshBeam.init_line or MeshBeam.init_curve")
+        refuse(self.p_XY is None and self.sections != "linear", "the mesh has no derivative p_XY "
+               "of its directors: build it with MeshBeam.init_line or init_curve", error=MeshError)
         self._check()
 
     def _check(self):
         """Raise MeshError where an element has no length, or the body folds."""
         p, t = self.doflocs, self.t
         chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
-        has_length = (chord > 4 * EPS * np.abs(p).max()) & (self.lengths > 0.0)
-        if not has_length.all():
-            k = int(np.argmin(has_length))
-            a, b = p[:, t[:, k]].T.tolist()
-            raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
+        refuse_any((chord <= 4 * EPS * np.abs(p).max()) | (self.lengths <= 0.0), "element {k} has "
+                   "no length: its nodes are at {} and {}", *p[:, t].swapaxes(0, 1),
+                   error=MeshError)
         MappingBeam(self).check()  # before its arrays are copied: not the mapping that is kept
 
     def with_sections(self, sections: str) -> MeshBeam:
@@ -504,9 +492,9 @@ class MeshBeam(NumberedMesh):
         """
         size = 0.25 * self.height if size is None else require_positive("size", size)
         growth = require_positive("growth", growth)
-        if 3.0 * self.height / size > MAX_ELEMENTS:
-            raise InputError(f"size = {size:g} would make more than {MAX_ELEMENTS} elements of a "
-                             f"beam of height {self.height:g}: give a larger one")
+        refuse(3.0 * self.height / size > MAX_ELEMENTS, "size = {:g} would make more than {} "
+               "elements of a beam of height {:g}: give a larger one", size, MAX_ELEMENTS,
+               self.height)
         at = points_of_rows(at)
         if isinstance(at, str) or is_point(at) or not isinstance(at, (tuple, list, set, frozenset)):
             at = [at]
@@ -537,8 +525,8 @@ class MeshBeam(NumberedMesh):
         """
         require_unmasked("elements", elements)
         elements = np.unique(self.normalize_elements(elements))
-        if len(elements) == 0:
-            raise MeshError("a mesh needs at least one element: the given set is empty")
+        refuse(not len(elements), "a mesh needs at least one element: the given set is empty",
+               error=MeshError)
         nodes = np.unique(self.t[:, elements])
         renumber = np.full(self.p.shape[1], -1, dtype=np.int32)
         renumber[nodes] = np.arange(len(nodes))
@@ -595,9 +583,8 @@ class MeshBeam(NumberedMesh):
     def scaled(self, factors: ArrayLike) -> MeshBeam:
         """The mesh and its height scaled by a positive number, or several equal ones (n,)."""
         f = np.unique(require_finite("factors", factors))
-        if len(f) != 1 or f[0] <= 0:
-            raise MeshError(f"a beam is scaled by one positive factor in all directions, got "
-                            f"{factors!r}; sections would not stay normal otherwise")
+        refuse(len(f) != 1 or f[0] <= 0, "a beam is scaled by one positive factor in all "
+               "directions, got {!r}: sections would tilt otherwise", factors, error=MeshError)
         return self._moved(np.eye(2), np.zeros(2), f[0])
 
     # pictures and files
@@ -655,10 +642,8 @@ class MeshBeam(NumberedMesh):
             if getattr(facets, "ori", None) is not None:
                 content[f"o_{name}"] = facets.ori
         content |= {f"s_{name}": elements for name, elements in (self.subdomains or {}).items()}
-        try:
+        with archive.writing(path):
             archive.write(path, content)
-        except OSError as error:
-            raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
     @classmethod
     def load_npz(cls, filename: StrPath) -> MeshBeam:
@@ -675,9 +660,7 @@ class MeshBeam(NumberedMesh):
             data = archive.read(path)
             missing = sorted(set(NEEDED) - data.keys())
             refuse(missing, "{} are missing", missing, error=MeshError)
-            kind = str(data.get("kind", cls.kind))
-            if kind not in kinds:
-                raise MeshError(f"its kind {kind!r} is not known, only {sorted(kinds)}")
+            kind = require_option("kind of mesh", str(data.get("kind", cls.kind)), kinds)
             tags = {name[2:]: OrientedBoundary(facets, data[f"o_{name[2:]}"])
                     if f"o_{name[2:]}" in data else facets
                     for name, facets in data.items() if name.startswith("b_")}
@@ -690,11 +673,9 @@ class MeshBeam(NumberedMesh):
                    if name in data})
         except OSError as error:
             raise FileError(f"cannot read {str(path)!r}: {error}") from error
-        except MeshError as error:
-            raise MeshError(f"{str(path)!r} contains no beam: {error}") from error
         except Exception as error:  # whatever is in the file
-            raise MeshError(f"{str(path)!r} contains no beam, or is damaged: "
-                            f"{type(error).__name__}: {error}") from error
+            why = error if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            raise MeshError(f"{str(path)!r} contains no beam: {why}") from error
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
              cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:
@@ -711,17 +692,12 @@ class MeshBeam(NumberedMesh):
             return self.save_npz(path)
         import meshio
 
-        try:
-            if not path.suffix:
-                raise FileError(f"the file name {str(path)!r} has no suffix: end it with .npz, "
-                                ".vtu or another format of meshio")
-            with contextlib.nullcontext(path) if path.suffix in IN_PARTS else (
-                    archive.replacing(path)) as new:
-                self.to_meshquad().save(new, point_data, cell_data, **kwargs)
-        except FileError:
-            raise
-        except (OSError, meshio.ReadError, meshio.WriteError, SystemExit) as error:
-            raise FileError(f"cannot write {str(path)!r}: {error}") from error
+        refuse(not path.suffix, "the file name {!r} has no suffix: end it with .npz, .vtu or "
+               "another format of meshio", str(path), error=FileError)
+        with archive.writing(path, (OSError, meshio.ReadError, meshio.WriteError, SystemExit)), (
+                contextlib.nullcontext(path) if path.suffix in IN_PARTS else archive.replacing(path)
+                ) as new:
+            self.to_meshquad().save(new, point_data, cell_data, **kwargs)
 
     @classmethod
     def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
@@ -765,7 +741,6 @@ def _chain(n):
 def _radians(angle):
     """An angle as a float; InputError if it is likely to be in degrees."""
     angle = require_finite_scalar("angle", angle)
-    if abs(angle) > 2.0 * np.pi * (1 + 1e-12):
-        raise InputError(f"an angle is given in radians, at most 2 pi in size, got {angle!r}: for "
-                         f"degrees write np.deg2rad({angle:g})")
+    refuse(abs(angle) > 2.0 * np.pi * (1 + 1e-12), "an angle is given in radians, at most 2 pi in "
+           "size, got {!r}: for degrees write np.deg2rad({:g})", angle, angle)
     return angle

@@ -13,8 +13,8 @@ from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D
 from skfem.refdom import RefLine, RefQuad, Refdom
 
-from ..core import (Array, ArrayLike, Immutable, MeshError, NearMisses, read_only, require_option,
-                    shown)
+from ..core import (Array, ArrayLike, Immutable, MeshError, NearMisses, read_only, refuse,
+                    refuse_any, require_option)
 from .mapping import halved as halved_heights, heights_of
 from .places import satisfying
 
@@ -147,12 +147,11 @@ class NumberedMesh(Immutable, NearMisses, Mesh2D):
             elements = np.nonzero(elements)[0]
         if not elements.size:
             return np.zeros(0, dtype=np.int32)
-        if elements.dtype.kind not in "iu" or elements.ndim != 1:
-            raise MeshError("elements are given by their numbers, by the name of a subdomain, by a "
-                            f"function or a mask, got {shown(given)}")
-        bad = elements[(elements < 0) | (elements >= self.nelements)]
-        if len(bad):
-            raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got {bad[0]}")
+        refuse(elements.dtype.kind not in "iu" or elements.ndim != 1, "elements are given by their "
+               "numbers, by the name of a subdomain, by a function or a mask, got {!r}", given,
+               error=MeshError)
+        refuse_any((elements < 0) | (elements >= self.nelements), "the elements are numbered 0 to "
+                   "{}, got {}", self.nelements - 1, elements, error=MeshError)
         return elements
 
     def elements_satisfying(self, test: Callable[[Array], Array]) -> Array:

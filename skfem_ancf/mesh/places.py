@@ -11,8 +11,9 @@ import numpy as np
 import scipy
 from numpy.polynomial.polynomial import polyder, polyval
 
-from ..core import (Array, ArrayLike, CallbackError, InputError, MeshError, NameUnknown, Place, ask,
-                    cached_property, hermite_basis, is_masked, require_point, shown)
+from ..core import (Array, ArrayLike, CallbackError, InputError, MeshError, Place, ask,
+                    cached_property, hermite_basis, is_masked, refuse, refuse_any, require_option,
+                    require_point, shown)
 
 EPS = float(np.finfo(float).eps)
 #: A distance outside of elements that have no such point.
@@ -187,16 +188,13 @@ class Finder:
     def inside(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array]:
         """As :meth:`find`, but raises MeshError for points outside the body, or the chain."""
         e, X, outside, tied = self.find(x, chain)
-        inside = outside <= self.allowed
-        if not inside.all():
-            bad, mesh = np.flatnonzero(~inside), self.mesh
-            x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
-            raise MeshError(
-                f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "
-                f"{'the body' if chain is None else 'the line that was named'}"
-                f"{more if len(outside) > 1 else ''}: points are given by their position in the "
-                f"reference configuration of height {mesh.height:.6g}, whose axis runs from "
-                f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")
+        bad, mesh = ~(outside <= self.allowed), self.mesh
+        if bad.any():
+            refuse_any(bad, "the point {:.9g} is outside {}{}: points are given by their position "
+                       "in the reference configuration of height {:.6g}, whose axis runs from {} "
+                       "to {}; {}", x, "the body" if chain is None else "the line that was named",
+                       f" ({bad.sum()} of {len(bad)} points are)" * (len(bad) > 1), mesh.height,
+                       mesh.p[:, 0].tolist(), mesh.p[:, -1].tolist(), self.extent, error=MeshError)
         return e, X, tied
 
     def from_axis(self, e: Array, X: Array) -> Array:
@@ -297,37 +295,31 @@ def facets_of(mesh: Any, place: Place) -> Array:
     # function of points (2, n) that returns n truth values, for the facets whose midpoints satisfy
     # it; numbers of facets in an array of integers; a tuple, list or set of places, or an array (n,
     # 2) of points. A scikit-fem ``OrientedBoundary`` is returned as it is.
-    if is_masked(place):
-        raise InputError(f"a place must not have masked values, got {shown(place)}")
+    refuse(is_masked(place), "a place must not have masked values, got {!r}", place)
     place = points_of_rows(place)
     if isinstance(place, str):
         named = mesh.boundaries or {}
-        if place not in named:
-            raise NameUnknown("boundary", place, named)
-        if not len(named[place]):
-            raise MeshError(f"the boundary {place!r} is empty: it has no facet of this mesh; "
-                            f"others are {_names(mesh)}")
-        return named[place]
+        found = named[require_option("boundary", place, named)]
+        refuse(not len(found), "the boundary {!r} is empty: it has no facet of this mesh; others "
+               "are {}", place, _names(mesh), error=MeshError)
+        return found
     if is_point(place):
         return np.array([section_at(mesh, cast("ArrayLike", place))], dtype=np.int32)
     if isinstance(place, np.ndarray):
-        if place.dtype.kind not in "iu" or place.ndim != 1 or not len(place):
-            raise InputError("facets are a one-dimensional array of integers that is not empty, "
-                             f"got {shown(place)}; a place may also be "
-                             f"{KINDS.rsplit(', or', 1)[0]}")
-        bad, n = place[(place < 0) | (place >= mesh.nfacets)], mesh.p.shape[1]
-        if len(bad):
-            raise MeshError(f"the facets are numbered 0 to {mesh.nfacets - 1}, got {bad[0]}: 0 to "
-                            f"{n - 1} are the sections of the nodes, then come the bottom and the "
-                            f"top of the {mesh.nelements} elements")
+        refuse(place.dtype.kind not in "iu" or place.ndim != 1 or not len(place), "facets are a "
+               "one-dimensional array of integers that is not empty, got {!r}; a place may also be "
+               "{}", place, KINDS.rsplit(", or", 1)[0])
+        refuse_any((place < 0) | (place >= mesh.nfacets), "the facets are numbered 0 to {}, got "
+                   "{}: 0 to {} are the sections of the nodes, then come the bottom and the top of "
+                   "the {} elements", mesh.nfacets - 1, place, mesh.p.shape[1] - 1, mesh.nelements,
+                   error=MeshError)
         return place
     if callable(place):
         x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
         found = satisfying(place, x)
-        if not len(found):
-            raise MeshError(f"the function {place!r} selects none of the {x.shape[1]} facets, "
-                            f"whose middles lie from {_pair(x.min(axis=1))} to "
-                            f"{_pair(x.max(axis=1))}; boundaries with names are {_names(mesh)}")
+        refuse(not len(found), "the function {!r} selects none of the {} facets, whose middles lie "
+               "from {} to {}; boundaries with names are {}", place, x.shape[1],
+               _pair(x.min(axis=1)), _pair(x.max(axis=1)), _names(mesh), error=MeshError)
         return found
     if isinstance(place, (tuple, list, set, frozenset)) and len(place) and not all(
             isinstance(p, numbers.Number) for p in place):
@@ -344,9 +336,9 @@ def facets_of(mesh: Any, place: Place) -> Array:
 def node_of(mesh: Any, place: Place) -> int:
     """The node of a place that is one section; MeshError for others."""
     facets = np.asarray(facets_of(mesh, place))
-    if len(facets) != 1 or facets[0] >= mesh.p.shape[1]:
-        raise MeshError(f"boundary {place!r} is not one section of the beam; sections are "
-                        "'left' and 'right', or the point of a node of the axis")
+    refuse(len(facets) != 1 or facets[0] >= mesh.p.shape[1], "boundary {!r} is not one section of "
+           "the beam; sections are 'left' and 'right', or the point of a node of the axis", place,
+           error=MeshError)
     return int(facets[0])
 
 
@@ -391,9 +383,8 @@ def satisfying(test: Callable[[Array], Any], x: Array, what: str = "a place") ->
     """Numbers of the points x (2, n) that satisfy a function; ``what`` is for messages."""
     found = ask(f"the function that names {what}, of x of shape {x.shape},", test, x)
     chosen = np.asarray(found)
-    if is_masked(found) or chosen.shape != x.shape[1:] or chosen.dtype != bool:
-        raise CallbackError(
-            f"a function that names {what} takes points x of shape (2, n) and returns n truth "
-            f"values, as lambda x: x[0] > 1; for n = {x.shape[1]} it returned {chosen.dtype} of "
-            f"shape {chosen.shape}")
+    refuse(is_masked(found) or chosen.shape != x.shape[1:] or chosen.dtype != bool, "a function "
+           "that names {} takes points x of shape (2, n) and returns n truth values, as lambda x: "
+           "x[0] > 1; for n = {} it returned {} of shape {}", what, x.shape[1], chosen.dtype,
+           chosen.shape, error=CallbackError)
     return np.nonzero(chosen)[0].astype(np.int32)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebinterpolate, chebval
 from numpy.polynomial.legendre import legvander
 
-from ..core import Array, Immutable, InputError, Rule, gauss, lagrange, refuse
+from ..core import Array, Immutable, Rule, gauss, lagrange, refuse
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..mesh.mesh_beam import MeshBeam
@@ -167,9 +167,8 @@ class LayerPoints:
         value = getattr(self.layer, name)
         if callable(value):
             return self.layer.measure.values(self, name, whole)
-        if value is None and name == "density":
-            raise InputError(f"{self.layer.material!r} has no density: give one to use mass or "
-                             "gravity")
+        refuse(value is None and name == "density", "{!r} has no density: give one to use mass or "
+               "gravity", self.layer.material)
         return 1.0 if value is None else value
 
 
@@ -405,27 +404,23 @@ class Across(Immutable):
         out = []
         for layer in self.layers:
             terms = list(formulation.terms(self.element_of(layer), layer.material))
-            if not terms:
-                raise InputError(f"{formulation!r} has no terms, so the stiffness is zero: "
-                                 "terms(element, material) must return at least one Term")
+            refuse(not terms, "{!r} has no terms, so the stiffness is zero: terms(element, "
+                   "material) must return at least one Term", formulation)
             out.append((layer, terms))
             if self.plain:
                 return out
             eta, w = layer.measure.gauss(2)
             for term in terms:
-                if self.element.order and term.section_samples is not None and layer.measure.moves:
-                    raise InputError(
-                        f"formulation {formulation.name!r} at order {self.element.order} uses the "
-                        "mean strain of the section, whose weights would vary along a taper "
-                        "with constant thicknesses: use order 2 or more with the formulation "
-                        "'assumed' or 'continuum', or nu = 0")
+                refuse(self.element.order and term.section_samples is not None
+                       and layer.measure.moves, "formulation {!r} at order {} uses the mean strain "
+                       "of the section, whose weights would vary along a taper with constant "
+                       "thicknesses: use order 2 or more with the formulation 'assumed' or "
+                       "'continuum', or nu = 0", formulation.name, self.element.order)
                 (x, v), degree = term.section, max(layer.measure.spent, 1)
-                if len(x) > 1 and np.max(np.abs((v @ legvander(2.0 * x - 1.0, degree))
-                                                - w @ legvander(2.0 * eta - 1.0, degree))) > 1e-9:
-                    raise InputError(
-                        f"formulation {formulation.name!r} uses a rule across the section "
-                        f"that does not fit {layer.measure!r}: use the rules that "
-                        "self.full_rules(element) returns")
+                off = v @ legvander(2.0 * x - 1.0, degree) - w @ legvander(2.0 * eta - 1.0, degree)
+                refuse(len(x) > 1 and np.max(np.abs(off)) > 1e-9, "formulation {!r} uses a rule "
+                       "across the section that does not fit {!r}: use the rules that "
+                       "self.full_rules(element) returns", formulation.name, layer.measure)
         return out
 
     def element_of(self, layer: Layer) -> ElementBeam:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import NameUnknown, refuse
+from ..core import NameUnknown, refuse, require_option
 from ..materials.library import LENGTHS
 
 #: Height, width, thickness of web and flange, root radius.
@@ -91,9 +91,8 @@ def _rows(text):
 
 
 def _found(series, number, rows):
-    if number not in rows:
-        raise NameUnknown("profile", f"{series} {number}", [f"{series} {one}" for one in rows])
-    return rows[number]
+    rows = {f"{series} {one}": row for one, row in rows.items()}
+    return rows[require_option("profile", f"{series} {number}", rows)]
 
 
 @lru_cache(64)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial.legendre import legval, legvander
 
 from ..core import (Array, CallError, Immutable, InputError, Rule, ask_array, gauss, refuse,
-                    require_flag, require_option, require_positive, shown)
+                    refuse_any, require_flag, require_option, require_positive, shown)
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..materials.library import LENGTHS
@@ -492,10 +492,8 @@ def evaluated(what: str, function: Callable[..., Any], x: Array, y: Array) -> Ar
     """Values of a function of material coordinates, checked to be positive; ``what`` names it."""
     x, y = (np.ascontiguousarray(a) for a in np.broadcast_arrays(x, y))
     out = ask_array(f"{what}(x, y)", x.shape, function, x, y, number=True)
-    if not np.all(out > 0.0):
-        k = np.unravel_index(np.argmin(out), out.shape)
-        raise InputError(f"{what}(x, y) must be positive all over the body: the function returns "
-                         f"{out[k]:.6g} at x = {x[k]:.6g}, y = {y[k]:.6g}")
+    refuse_any(out.ravel() <= 0.0, "{}(x, y) must be positive all over the body: the function "
+               "returns {:.6g} at x = {:.6g}, y = {:.6g}", what, out.ravel(), x.ravel(), y.ravel())
     return out
 
 
@@ -513,14 +511,12 @@ class Layers(Section):
                "Section.layers((0.001, steel), (0.002, brass), width=0.01); got none")
         found = []
         for k, layer in enumerate(parts):
-            if not isinstance(layer, (tuple, list)) or len(layer) not in (2, 3) or not isinstance(
-                    layer[1], Material):
-                raise InputError(f"layer {k} must be a thickness and a material, and perhaps a "
-                                 f"width, as (0.001, steel), got {shown(layer)}")
+            refuse(not isinstance(layer, (tuple, list)) or len(layer) not in (2, 3)
+                   or not isinstance(layer[1], Material), "layer {} must be a thickness and a "
+                   "material, and perhaps a width, as (0.001, steel), got {!r}", k, layer)
             own = layer[2] if len(layer) == 3 else width
-            if own is None:
-                raise InputError(f"layer {k} has no width: give width= for all layers, or a third "
-                                 f"entry, as ({shown(layer[0])}, material, 0.01)")
+            refuse(own is None, "layer {} has no width: give width= for all layers, or a third "
+                   "entry, as ({!r}, material, 0.01)", k, layer[0])
             found.append((
                 None if layer[0] is None else require_positive(f"the thickness of layer {k}",
                                                                layer[0]),
@@ -536,11 +532,9 @@ class Layers(Section):
         given = [thickness for thickness, _, _ in self.parts]
         total = sum(thickness for thickness in given if thickness is not None)
         least = mesh.height if mesh.heights is None else float(np.min(mesh.heights))
-        if None in given and total >= least * (1.0 - FILLS):
-            raise InputError(f"the layers are {total:.9g} high together, and the mesh "
-                             f"{least:.9g}{' where it is least' * (mesh.heights is not None)}: "
-                             f"nothing is left for layer {given.index(None)}, whose thickness is "
-                             "None")
+        refuse(None in given and total >= least * (1.0 - FILLS), "the layers are {:.9g} high "
+               "together, and the mesh {:.9g}{}: nothing is left for that of thickness None", total,
+               least, " where it is least" * (mesh.heights is not None))
         if mesh.heights is not None:
             refuse(None not in given, "{!r} has constant thicknesses and does not fill a tapered "
                    "mesh: give one layer the thickness None, to fill the remaining height, or use "
@@ -548,10 +542,9 @@ class Layers(Section):
             return [layer_of(law, width, Moving(partial(_layer, given, k), mesh.height))
                     for k, (_, law, width) in enumerate(self.parts)]
         tops = np.cumsum([mesh.height - total if x is None else x for x in given])
-        if abs(tops[-1] - mesh.height) > FILLS * mesh.height:
-            raise InputError(f"the thicknesses add up to {tops[-1]:.9g}, the height of the mesh is "
-                             f"{mesh.height:.9g}: they must be equal; a layer of thickness None "
-                             "fills the remaining height")
+        refuse(abs(tops[-1] - mesh.height) > FILLS * mesh.height, "the thicknesses add up to "
+               "{:.9g}, the height of the mesh is {:.9g}: they must be equal; a layer of thickness "
+               "None fills the remaining height", tops[-1], mesh.height)
         ends = np.append(0.0, tops / tops[-1])
         ends[-1] = 1.0
         return [layer_of(law, width if callable(width) else width * (b - a), Uniform(a, b))
@@ -587,8 +580,7 @@ class Numbers(Section):
         self.rhoA = None if rhoA is None else require_positive("rhoA", rhoA)
         self.rhoI = None if rhoI is None else require_positive("rhoI", rhoI)
         self.width = require_positive("width", width)
-        if rhoI is not None and rhoA is None:
-            raise InputError("rhoI is given without rhoA: give both, or neither of them")
+        refuse(rhoI is not None and rhoA is None, "rhoI is given without rhoA: give both, or none")
 
     def element_for(self, element: ElementBeam) -> ElementBeam:
         plane = element if element.order < 2 else element.plane()
@@ -627,25 +619,21 @@ class Profile(Section):
         self.name = require_option("profile", name, SIZES)
         self.scaled = require_flag("scaled", scaled)
         wanted = SIZES[name]
-        if set(sizes) != set(wanted):
-            raise CallError(
-                f"a profile {name!r} has the sizes {', '.join(wanted) or 'of the mesh alone'}; got "
-                f"{', '.join(sizes) or 'none'}. Its height is that of the mesh")
-        self.sizes = {k: require_positive(k, v) for k, v in sizes.items()}
-        if self.sizes.get("web", 0.0) > self.sizes.get("width", np.inf):
-            raise InputError(f"the web, {sizes['web']:g}, is wider than the profile, "
-                             f"{sizes['width']:g}")
+        refuse(set(sizes) != set(wanted), "a profile {!r} has the sizes {}; got {}. Its height is "
+               "that of the mesh", name, ", ".join(wanted) or "of the mesh alone",
+               ", ".join(sizes) or "none", error=CallError)
+        self.sizes = s = {k: require_positive(k, v) for k, v in sizes.items()}
+        refuse(s.get("web", 0.0) > s.get("width", np.inf), "the web, {:g}, is wider than the "
+               "profile, {:g}", s.get("web"), s.get("width"))
 
     def pieces(self, h: Any) -> list[Piece]:
         """The width in intervals from bottom to top, at heights h, a number or (..., 1)."""
         s, name = self.sizes, self.name
         width = s.get("width", h)
         thickness = s.get("flange", s.get("wall", 0.0)) / h
-        if np.any(thickness * (1 if name == "T" else 2) >= 1.0) or (
-                name == "box" and 2.0 * s["wall"] >= width):
-            raise InputError(f"{self!r} does not fit in a height of {np.min(h):g}: its walls or "
-                             f"flanges of {s.get('flange', s.get('wall')):g} fill it; use thinner "
-                             "ones or a higher mesh")
+        refuse(np.any(thickness * (1 if name == "T" else 2) >= 1.0) or (
+            name == "box" and 2.0 * s["wall"] >= width), "{!r} does not fit in a height of {:g}: "
+            "its walls or flanges fill it; use thinner ones or a higher mesh", self, np.min(h))
         if name == "rectangle":
             return [Piece(0.0, 1.0, width)]
         if name in ("circle", "tube"):
@@ -684,20 +672,19 @@ class Standard(Section):
     """A profile by its standard name, see :meth:`Section.profile`, with its ``height``."""
 
     def __init__(self, name: str, unit: str = "m", **sizes: float) -> None:
-        if sizes:
-            raise CallError(f"{name!r} has its sizes by its name, got {', '.join(sizes)}: for "
-                            'others take Section.profile("I", width=..., web=..., flange=...)')
+        refuse(sizes, "{!r} has its sizes by its name, got {}: for others take "
+               'Section.profile("I", width=..., web=..., flange=...)', name, ", ".join(sizes),
+               error=CallError)
         self.name, self.unit = name, require_option("unit", unit, tuple(LENGTHS))
         self.height, pieces = pieces_of(name, unit)
         self._pieces = [Piece(*piece) for piece in pieces]
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
-        if mesh.heights is not None or abs(mesh.height - self.height) > FILLS * self.height:
-            raise InputError(
-                f"{self.name} is {self.height:g} {self.unit} high, and the mesh {mesh.height:g}"
-                f"{' with a taper' * (mesh.heights is not None)}: make it by height=section.height,"
-                " and give the unit of length of the mesh, as Section.profile("
-                f'{self.name!r}, unit="mm")')
+        refuse(mesh.heights is not None or abs(mesh.height - self.height) > FILLS * self.height,
+               '{} is {:g} {} high, and the mesh {:g}{}: make it by height=section.height, and '
+               'give the unit of length of the mesh, as Section.profile("IPE 200", unit="mm")',
+               self.name, self.height, self.unit, mesh.height,
+               " with a taper" * (mesh.heights is not None))
         measure = Weighted(self._pieces)
         widths = [np.max(piece.width(np.linspace(*piece[:2], 9))) if callable(piece.width) else
                   piece.width for piece in self._pieces]
