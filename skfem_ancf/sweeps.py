@@ -177,23 +177,21 @@ def _members(parameters):
     if isinstance(parameters, Mapping) or hasattr(parameters, "columns"):  # of pandas
         columns = {name: getattr(x, "values", x) for name, x in parameters.items()}
         for name, x in columns.items():
-            if isinstance(x, str) or not hasattr(x, "__len__") or np.shape(x) == ():
-                raise InputError(f"the parameter {name!r} must have one value for each member, got "
-                                 f"{shown(x)}; what is the same for all belongs into build")
+            refuse(isinstance(x, str) or not hasattr(x, "__len__") or np.shape(x) == (),
+                   "the parameter {!r} must have one value for each member, got {!r}; what is the "
+                   "same for all belongs into build", name, x)
         lengths = {name: len(x) for name, x in columns.items()}
         refuse(len(set(lengths.values())) > 1, "the parameters must have equal lengths, got {}; "
                "for all combinations hand a list of dicts, made by itertools.product", lengths)
         parameters = [dict(zip(columns, row)) for row in zip(*columns.values())]
-    elif isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
-        raise InputError("parameters must be a dict of arrays or a list of dicts, got "
-                         f"{shown(parameters)}")
+    refuse(isinstance(parameters, str) or not hasattr(parameters, "__iter__"), "parameters must be "
+           "a dict of arrays or a list of dicts, got {!r}", parameters)
     members = list(parameters)
     refuse(not members, "there are no members in the parameters")
     for k, member in enumerate(members):
-        if not isinstance(member, Mapping) or set(member) != set(members[0]):
-            raise InputError("parameters must be a dict of arrays, or a list of dicts with "
-                             f"equal names; the first has {shown(members[0])}, number {k} is "
-                             f"{shown(member)}")
+        refuse(not isinstance(member, Mapping) or set(member) != set(members[0]), "parameters must "
+               "be a dict of arrays, or a list of dicts with equal names; the first has {!r}, "
+               "number {} is {!r}", members[0], k, member)
     return members
 
 

@@ -192,32 +192,31 @@ class Checkpoint:
                                   ) from None
 
     def _write(self):
-        """Write all that a Run consists of, see :func:`resume`."""
-        run, now = self.run, dict(vars(self.run.y))
+        """Write all that a Run consists of: the last instant, and the history so far."""
+        run, now, begun = self.run, dict(vars(self.run.y)), time.monotonic()
         groups = {"task": vars(run.task), "run": run.arrays(), "memory": now.pop("memory") or {},
                   "now": now, "history": run.columns(), "sensor": run.recorder.arrays()}
         q0, scheme = _identity(run.system, run.scheme)
-        write(self.path, {
-            "format": np.array(FORMAT), "every": np.array(self.every or 0), "q0": q0,
-            "scheme": np.array(scheme), "done": np.array(run.done), **{
-                f"{group}.{name}": x for group, arrays in groups.items()
-                for name, x in arrays.items() if x is not None}})
-        self._steps, self._clock = run.steps, time.monotonic()
+        try:
+            write(self.path, {
+                "format": np.array(FORMAT), "every": np.array(self.every or 0), "q0": q0,
+                "scheme": np.array(scheme), "done": np.array(run.done), **{
+                    f"{group}.{name}": x for group, arrays in groups.items()
+                    for name, x in arrays.items() if x is not None}})
+        finally:
+            self._steps, self._clock = run.steps, time.monotonic()
+            self._took = self._clock - begun
 
     def update(self) -> None:
         """Write if it is due, or at the end; a failure gives a CheckpointWarning."""
-        run, begun = self.run, time.monotonic()
-        due = (begun - self._clock > max(SECONDS, self._took / SHARE) if self.every is None
-               else run.steps - self._steps >= self.every)
-        if not (due or run.done):
-            return
-        try:
-            self._write()
-        except OSError as error:
-            self._steps, self._clock = run.steps, time.monotonic()
-            warn(f"the checkpoint {str(self.path)!r} could not be written at t = "
-                 f"{run.y.t:.6g}, the previous one remains: {error}", CheckpointWarning)
-        self._took = time.monotonic() - begun
+        run, waited = self.run, time.monotonic() - self._clock
+        if run.done or (waited > max(SECONDS, self._took / SHARE) if self.every is None
+                        else run.steps - self._steps >= self.every):
+            try:
+                self._write()
+            except OSError as error:
+                warn(f"the checkpoint {str(self.path)!r} could not be written at t = "
+                     f"{run.y.t:.6g}, the previous one remains: {error}", CheckpointWarning)
 
 
 def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
