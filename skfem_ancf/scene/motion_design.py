@@ -40,8 +40,8 @@ TINY = 1e-5
 CHANGED = 1e-9
 #: Part of a force along a direction that its pattern may miss.
 MISSED = 1e-6
-#: The arrays of a motion on which the next step depends.
-NAMES = ("u", "v", "acceleration", "algorithmic")
+#: The arrays of a motion on which the next step depends, and what else readings depend on.
+NAMES, READ = ("u", "v", "acceleration", "algorithmic", "force"), ("multipliers",)
 
 
 class MotionDesign(Design):
@@ -178,8 +178,8 @@ class MotionDesign(Design):
         return np.concatenate([np.ravel(read(one, at, state)) for one, at in located])
 
     def _linear_step(self, y, before):
-        mean = self.scheme.conserving and before is not None
-        return (_MeanStep if mean else _Step)(self, y, before)
+        return (_MeanStep if self.scheme.conserving and before is not None else _Step)(
+            self, y, before)
 
     # forward
 
@@ -198,7 +198,7 @@ class MotionDesign(Design):
             step = self._linear_step(y, before)
             old = step.forward(by(step.equations), old)
             rows.append(np.array([sum(c * self._read_in(*other, replace(y, **{
-                name: getattr(y, name) + s * x[:, i] for name, x in old.items()}))
+                name: getattr(y, name) + s * x[:, i] for name, x in step.named(old)}))
                 for c, s, other in some) for i, some in enumerate(moved)]).T)
         return np.concatenate(rows)
 
@@ -212,8 +212,7 @@ class MotionDesign(Design):
         groups = [([k], np.full(c.N + c.m, k)) for k in range(len(p))]
         if isinstance(self.build, Parameters):
             groups = self.build.groups(c.N + c.m)
-        out, bars = np.zeros(len(p)), {name: np.zeros(c.N) for name in NAMES}
-        bars["force"] = np.zeros(c.m)
+        out, bars = np.zeros(len(p)), np.zeros(4 * c.N + c.m)
         others: dict[bytes, Any] = {}
 
         def equations(step, w, q):
@@ -229,9 +228,8 @@ class MotionDesign(Design):
                 rows = [rows_of(self._built.system, state_of(self._built.system, self.scheme, y),
                                 self._built.sensors[name]) for name in self.readings]
                 *by, pull = (w @ np.concatenate(parts) for parts in zip(*rows))
-                for name, x in zip(NAMES, by):
-                    bars[name] = bars[name] + x
-            adjoint, bars = step.backward(bars, pull)
+                bars[:3 * c.N] += np.concatenate(by)
+            adjoint, bars = step.backward(np.append(bars, pull))
             size = np.append(step.magnitudes(), [np.abs(w).max()] * read_here)
             found = Differences(partial(equations, step, w), p, h, STENCIL, CHANGED * size).of(
                 [(members, np.append(np.tile(of, len(adjoint) // len(of)), np.full(read_here, -1)))
@@ -249,7 +247,8 @@ class _Step:
 
     def __init__(self, design: MotionDesign, y: Motion, before: Motion | None) -> None:
         system = self._system = design._built.system
-        c, self.y, self._before, self._design = system.constraints, y, before, design
+        c, self.y, self._design = system.constraints, y, design
+        self._before = self._kept = None
         self._h = h = design.dt if before is None else y.t - before.t
         alpha_m, alpha_f, beta, gamma = design.scheme.parameters
         b, self._kick, q = 1.0 / (beta * h**2), (1.0 - alpha_m) / (1.0 - alpha_f), 1.0 - alpha_f
@@ -323,63 +322,67 @@ class _Step:
         if self._raw is not None:
             held = replace(y, v=self._raw[0], multipliers=y.multipliers - self._force)
         M, D, K, _, J = matrices_of(system, state_of(system, design.scheme, held))
-        K, self._damping = K + _turning(design, held), D
+        K = K + _turning(design, held)
         turned = [c.curvature(y.u, y.t, x) for x in (self._impulse, self._force)]
         s = INSTANT * h
         early, late = (c.sparse_jacobian(y.u + x * y.v + 0.5 * x * x * y.acceleration, y.t + x)
                        for x in (-s, s))
         slope, bend = (late - early) / (2.0 * s), (late - 2.0 * J + early) / s**2
-        none = [None, None]
+        none, N, m = [None, None], sparse.eye_array(c.N), sparse.eye_array(c.m)
+        out = {(0, 0): N, (1, 2): N, (2, 4): N, (3, 4): N, (4, 5): m, (5, 5): m}
         if self._raw is not None:
             first, second, third = K + to_v * D + to_a * M, turned[0] - to_v * M, [
                 turned[1] - to_a * M, None, *none]
-            joints = J
+            joints, free = J, sparse.diags_array(c.free * 1.0)
+            by_v, by_a = D @ free, sparse.csr_array(system.mass.tocsc()) @ free
+            rates = list(enumerate(zip(self._v, self._a)))
+            self._before = self._blocks({
+                **{(0, k): v * by_v + a * by_a for k, (v, a) in rates},
+                **{(2, k): -v * by_a for k, (v, a) in rates},
+                **{(4, k): -a * by_a for k, (v, a) in rates}}, "umumum", "uuuum")
+            self._kept = self._blocks({(3, k): f * N for k, f in enumerate(self._w)})
+            out |= {(3, 4): N / self._kick, (5, 1): m}
         else:
             first, joints = (M, J) if design.state is None else matrices_of(
                 system, design.state)[2::2]
             second, third = turned[0], [K, None, D, None]
+        self._after = self._blocks(out, columns="umumum")
         return _factors([
             [first, joints.T, *none, *none], [joints, *none, *none, None],
             [second, None, M, J.T, *none], [slope, None, J, None, *none],
             [*third, M, J.T], [bend, None, 2.0 * slope, None, J, None]], K + M / h**2, c, h)
 
-    def forward(self, change: Array, old: Any) -> dict[str, Array]:
-        """Derivatives (..., n) by name, from those of the equations and of the instant before."""
-        system, c = self._system, self._system.constraints
-        n = c.N + c.m
-        self.require_held(change[:c.N][c.fixed])
-        right = -change
-        if old is not None:
-            v, a = (c.free[:, None] * sum(f * old[name] for f, name in zip(row, NAMES))
-                    for row in (self._v, self._a))
-            right[:c.N] -= self._damping @ v
-            v, a = system.mass.tocsc() @ v, system.mass.tocsc() @ a
-            right[:c.N] -= a
-            right[n:n + c.N] += v
-            right[2 * n:2 * n + c.N] += a
-        x = self._solver.solve(right).reshape(3, n, -1)
-        found = dict(zip(NAMES, (x[0, :c.N], x[1, :c.N], x[2, :c.N], x[2, :c.N])))
-        found["multipliers"] = found["force"] = x[2, c.N:]
-        if old is not None:
-            found["multipliers"] = x[2, c.N:] + x[0, c.N:]
-            found["algorithmic"] = x[2, :c.N] / self._kick + sum(
-                f * old[name] for f, name in zip(self._w, NAMES))
-        return found
+    def _blocks(self, entries, rows="uuuumm", columns="uuuum"):
+        """A sparse matrix of blocks by place, with rows and columns of as many DOFs or joints."""
+        sizes = {"u": len(self.y.u), "m": len(self.y.multipliers)}
+        return sparse.block_array([[entries.get((i, j), sparse.csr_array((sizes[r], sizes[c])))
+                                    for j, c in enumerate(columns)] for i, r in enumerate(rows)],
+                                  format="csr")
 
-    def backward(self, bars: dict[str, Array], pull: Array) -> tuple[Array, dict[str, Array]]:
-        """The adjoint of the equations, and derivatives by the instant before."""
-        # ``bars`` are the derivatives by this instant, ``pull`` (m,) those by the multipliers.
-        c, M = self._system.constraints, self._system.mass.multiply
-        start = self._before is None
-        u, v, a, w = (bars[name] for name in NAMES)
-        right = np.concatenate([u, 0.0 * pull if start else pull, v, 0.0 * pull,
-                                a + (w if start else w / self._kick), pull + bars["force"]])
-        found = self._solver.solve(right, "T")
-        one, two, three = (x[:c.N] for x in found.reshape(3, -1))
-        kinds = (self._a, c.free * M(three - one)), (self._v, c.free * (
-            M(two) - self._damping.T @ one)), (self._w, w)
-        return found, {name: sum(row[k] * x for row, x in kinds) for k, name in enumerate(
-            NAMES)} | {"force": 0.0 * pull}
+    # With F_z dz + B dy0 + F_p dp = 0 for the unknowns z, the instant is dy = A dz + K dy0, where
+    # y0 is the one before, in the order of NAMES.
+
+    def named(self, found: Array) -> Iterator[tuple[str, Array]]:
+        """The parts of an instant by name."""
+        N, m = len(self.y.u), len(self.y.multipliers)
+        return zip(NAMES + READ, np.split(found, [N, 2 * N, 3 * N, 4 * N, 4 * N + m]))
+
+    def forward(self, change: Array, old: Array | None) -> Array:
+        """Derivatives of this instant (..., n), from those of the equations and of the instant
+        before."""
+        c = self._system.constraints
+        self.require_held(change[:c.N][c.fixed])
+        if old is None:
+            return self._after @ self._solver.solve(-change)
+        old = old[:4 * c.N + c.m]
+        return self._after @ self._solver.solve(-change - self._before @ old) + self._kept @ old
+
+    def backward(self, bars: Array) -> tuple[Array, Array]:
+        """The adjoint of the equations, and derivatives by the instant before, from those by this
+        instant."""
+        found = self._solver.solve(self._after.T @ bars, "T")
+        return found, bars if self._before is None else (
+            self._kept.T @ bars - self._before.T @ found)
 
 
 class _MeanStep(_Step):
@@ -423,6 +426,7 @@ class _MeanStep(_Step):
     def _linearised(self):
         system, y, start, h, c, t = (self._system, self.y, self._begin, self._h,
                                      self._system.constraints, self._t)
+        N, m, more = sparse.eye_array(c.N), sparse.eye_array(c.m), 1.0 + self._ahead
         M, u, force = sparse.csr_array(system.mass.tocsc()), self._middle, partial(_mean, system, t)
         late = _by_columns(self._design, lambda x: force(start.u, x), y.u, t, True)
         early = _by_columns(self._design, lambda x: force(x, y.u), start.u, t, True)
@@ -439,37 +443,20 @@ class _MeanStep(_Step):
                       lambda x: c.curvature(x, t, self._impulse)))
         turned = 0.5 * (c.curvature(u, t, self._force) + third)
         A = late + turned + 2.0 / h**2 * M
-        self._by = sparse.block_array([
-            [early + turned - 2.0 / h**2 * M, 0.25 * kick - 2.0 / h * M],
-            [0.5 * kick + 2.0 / h * M, M]], format="csr")
+        self._before = self._blocks({
+            (0, 0): early + turned - 2.0 / h**2 * M, (0, 1): 0.25 * kick - 2.0 / h * M,
+            (2, 0): 0.5 * kick + 2.0 / h * M, (2, 1): M}, "umum", "uuuum")
+        self._after = self._blocks({
+            (0, 0): N, (1, 2): N, (2, 2): more / h * N, (3, 2): N / h, (4, 1): m, (4, 3): m / h,
+            (5, 1): more * m, (5, 3): more / h * m}, columns="umum")
+        self._kept = self._blocks({(2, 1): -more / h * N, (2, 3): (1.0 - more) * N,
+                                   (3, 1): -1.0 / h * N, (5, 4): (1.0 - more) * m})
         J = c.sparse_jacobian(y.u, y.t)
         slope = (c.sparse_jacobian(y.u + s * y.v, y.t + s)
                  - c.sparse_jacobian(y.u - s * y.v, y.t - s)) / (2.0 * s)
         return _factors([
             [A, self._J.T, 0.25 * kick, by_impulse.T], [J, None, None, None],
             [0.5 * kick - 2.0 / h * M, None, M, self._J.T], [slope, None, J, None]], A, c, h)
-
-    def forward(self, change: Array, old: Any) -> dict[str, Array]:
-        c, h, ahead = self._system.constraints, self._h, self._ahead
-        n = c.N + c.m
-        self.require_held(change[:c.N][c.fixed])
-        right = -change.reshape(2, n, -1)
-        right[:, :c.N] -= (self._by @ np.concatenate([old["u"], old["v"]])).reshape(2, c.N, -1)
-        x = self._solver.solve(right.reshape(2 * n, -1)).reshape(2, n, -1)
-        w, force = (x[1, :c.N] - old["v"]) / h, x[0, c.N:] + x[1, c.N:] / h
-        return {"u": x[0, :c.N], "v": x[1, :c.N], "algorithmic": w, "force": force,
-                "acceleration": w + ahead * (w - old["algorithmic"]),
-                "multipliers": force + ahead * (force - old["force"])}
-
-    def backward(self, bars: dict[str, Array], pull: Array) -> tuple[Array, dict[str, Array]]:
-        N, h, ahead = self._system.N, self._h, self._ahead
-        w = (bars["algorithmic"] + (1.0 + ahead) * bars["acceleration"]) / h
-        force = bars["force"] + (1.0 + ahead) * pull
-        found = self._solver.solve(np.concatenate([bars["u"], force, bars["v"] + w, force / h]),
-                                   "T")
-        u, v = -(self._by.T @ found.reshape(2, -1)[:, :N].ravel()).reshape(2, N)
-        return found, {"u": u, "v": v - w, "acceleration": 0.0 * w,
-                       "algorithmic": -ahead * bars["acceleration"], "force": -ahead * pull}
 
 
 def _factors(rows, K, c, h):
