@@ -37,8 +37,7 @@ from .results.path import CriticalPoint, Path
 from .results.response import FrequencyResponse
 from .results import Extreme, Reaction, State
 from .scene.cases import Envelope, LoadCases
-from .scene.design import Design
-from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
+from .scene.design import BucklingLoad, CriticalLoad, Design, Frequency
 from .scene.motion_design import MotionDesign
 from .scene.parameters import Parameters
 from .scene import Frame, Scene

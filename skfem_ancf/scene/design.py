@@ -1,22 +1,26 @@
-"""Readings of static solutions as functions of parameters, and their derivatives by the adjoint."""
+"""Readings of static solutions as functions of parameters, with derivatives by the adjoint; among
+them frequencies, buckling loads and critical loads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 from ..actions.bound import derivative
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, ask, ask_array, refuse,
-                    require_finite, require_function, require_module, require_option)
+                    require_finite, require_flag, require_function, require_integer, require_module,
+                    require_option)
 from ..core.band import NO_FACTORS
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
+from ..equations.strain_tangent import Inverse, StrainTangent
 from ..results.state import State
-from .eigen_readings import EigenReading, residual
+from ..solvers import eigen
 from .linear_model import Bordered, rows_of
 from .parameters import Parameters
 
@@ -39,6 +43,18 @@ SNAP = 1e-4
 #: Gap in heights, and force relative to the largest, of a point that just touches; motion relative
 #: to that of others below which a point is held.
 TOUCH, HELD = 1e-6, 1e-3
+#: Relative distance of the squares of frequencies, or of buckling loads, that are not simple.
+SIMPLE = 1e-4
+#: Displacements for second derivatives along a shape, relative to the size of the scene.
+BENT = 1e-3
+#: The same for first derivatives of strains.
+SMALL = 1e-5
+#: Change of a load factor for derivatives by it.
+LOADED = 1e-3
+#: Tolerance of critical points: a limit point itself has the error of its root.
+LOCATE = 1e-12
+#: Relative work of a parameter on the mode of a bifurcation that is round-off.
+SYMMETRIC = 1e-4
 
 
 class Design:
@@ -219,57 +235,57 @@ class Design:
         if state is not None:
             require_smooth(state)
         self._frozen = [one._freeze(scene, found) for one, _, found in self._found]
-        c, first = scene.system.constraints, len(self._values)
+        first, n = len(self._values), scene.system.N + scene.system.constraints.m
         # the readings, then the rows of eigenvalues and those of their checks
         owners = [one for k, frozen in enumerate(self._frozen) for one in (
             self._places[k], first + k)[:1 if frozen.check is None else 2]]
-        self._owners = np.concatenate([np.arange(first), np.repeat(owners, c.N + c.m)]).astype(int)
+        self._owners = np.concatenate([np.arange(first), np.repeat(owners, n)]).astype(int)
         P = self._changes(p, state)
         out = np.zeros((first + len(self._frozen), len(p)))
         if state is not None:
-            n = c.N + c.m
-            out[:first] = self._by_solution(scene, state, P[:n])
-            P = P[n:]
+            # sensors and eigenvalues by the adjoint; functions by differences along the changes of
+            # the solution
+            by_state, R, P = np.zeros((first, n)), P[:n], P[n:]
+            at, functions, eigenvalues = 0, [], iter(self._frozen)
+            for one, size in zip(self._sensors(scene), self._counts):
+                if isinstance(one, EigenReading):
+                    row = next(eigenvalues).by_state
+                    by_state[at] = 0.0 if row is None else row
+                elif isinstance(one, Sensor) and not callable(one.what):
+                    row = rows_of(state.system, state, one)
+                    by_state[at:at + size] = np.hstack([row.u, row.multipliers])
+                else:
+                    functions.append((one.what if isinstance(one, Sensor) else one, at, size))
+                at += size
+            out[:first] = -(adjoint_of(state, by_state, R) @ R)
+            z = changes_of(state, R).T if functions else ()
+            for function, at, size in functions:
+                out[at:at + size] = np.array([_along(function, state, x) for x in z]).T
         np.add.at(out, self._owners, P.toarray())
         for frozen, work in zip(self._frozen, out[first:]):
             if frozen.check is not None:
                 frozen.check(work)
         return out[:first]
 
-    def _by_solution(self, scene, state, P):
-        """The part of the derivatives by displacements and multipliers, (r, n)."""
-        # Sensors and eigenvalues by the adjoint; functions by differences along the changes of the
-        # solution.
-        by_state = np.zeros((len(self._values), P.shape[0]))
-        at, functions, eigenvalues = 0, [], iter(self._frozen)
-        for one, size in zip(self._sensors(scene), self._counts):
-            if isinstance(one, EigenReading):
-                row = next(eigenvalues).by_state
-                by_state[at] = 0.0 if row is None else row
-            elif isinstance(one, Sensor) and not callable(one.what):
-                row = rows_of(state.system, state, one)
-                by_state[at:at + size] = np.hstack([row.u, row.multipliers])
-            else:
-                functions.append((one.what if isinstance(one, Sensor) else one, at, size))
-            at += size
-        out = -(adjoint_of(state, by_state, P) @ P)
-        if functions:
-            z = changes_of(state, P)
-            for function, at, size in functions:
-                out[at:at + size] = np.array([_along(function, state, x) for x in z.T]).T
-        return out
-
     def _changes(self, p, state):
         """Derivatives of equations, readings and rows of eigenvalues by parameters, sparse."""
-        sizes = self._typical(p)
-        touching = state is not None and state.system.forces.contacts.obstacles
+        values, c = np.abs(self._values), self._built.system.constraints
+        n, s = len(values), c.coordinate_sizes
         step, stencil = (MANY_STEP, PAIR) if len(p) > MANY else (STEP, STENCIL)
-        h = (TOUCHING if touching else step) * sizes
-        noise = CHANGED * self._magnitudes(state, [one.rows(self._built) for one in self._frozen])
-        by = Differences(lambda p: self._equations(p, state), p, h, stencil, noise)
+        # magnitudes of the terms in the equations, of the readings and their rows
+        size = [np.full(n, values.max(initial=0.0)), *(
+            np.repeat(np.abs(row).reshape(-1, c.N + c.m).max(axis=1), c.N + c.m)
+            for row in (one.rows(self._built) for one in self._frozen))]
+        if state is not None:
+            step = TOUCHING if state.system.forces.contacts.obstacles else step
+            force = state.system.after(state.memory).internal_force(
+                np.array(state.u), None, state.load)
+            size = [np.where(c.free, np.abs(force * s).max() / s, s),
+                    np.full(c.m, state.system.size), *size]
+        by = Differences(lambda p: self._equations(p, state), p, step * self._typical(p), stencil,
+                         CHANGED * np.concatenate(size))
         if isinstance(self.build, Parameters):
             # the same degrees of freedom in the equations and in the rows of each eigenvalue
-            n, c = len(self._values), self._built.system.constraints
             before, after = (0 if state is None else 1), (len(self._owners) - n) // (c.N + c.m)
             return by.of([(members, np.concatenate([np.tile(of, before), np.full(n, -1),
                                                     np.tile(of, after)]))
@@ -304,19 +320,6 @@ class Design:
             seen = self._read(scene, State(system, u, state.load, multipliers=l,
                                            memory=state.memory))
         return np.concatenate([*parts, seen, *(frozen.rows(scene) for frozen in self._frozen)])
-
-    def _magnitudes(self, state, rows):
-        """Typical magnitudes of the terms in the equations, of the readings and their rows."""
-        c, values = self._built.system.constraints, np.abs(self._values)
-        largest = np.concatenate([np.full(len(values), values.max(initial=0.0)), *(
-            np.repeat(np.abs(row).reshape(-1, c.N + c.m).max(axis=1), c.N + c.m) for row in rows)])
-        if state is None:
-            return largest
-        system, s = state.system, c.coordinate_sizes
-        force = system.after(state.memory).internal_force(np.array(state.u), None, state.load)
-        work = np.abs(force * s).max()
-        return np.concatenate([np.where(c.free, work / s, s), np.full(c.m, system.size),
-                               largest])
 
 
 class Differences:
@@ -418,11 +421,23 @@ def require_smooth(state: State) -> None:
            "plasticity): the derivative of a reading depends on the direction, and is not defined")
 
 
-def require_regular(state: State, force: Array, soft: Array) -> None:
-    """Raise InputError at a critical point, or where a point just touches an obstacle."""
-    # ``soft`` (N,) is the displacement for any force (N,), at a critical point the mode. There
-    # loads take away the stiffness by which elements resist.
-    system, u, resists = state.system.after(state.memory), np.array(state.u), 0.0
+def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
+    """The adjoint (r, N + m) of readings, for products with changes P (N + m, n)."""
+    # Raises InputError at a critical point, or where a point just touches an obstacle. ``soft`` is
+    # the displacement for any force, at a critical point the mode: there loads take away the
+    # stiffness by which elements resist.
+    system, u, resists, found = state.system.after(state.memory), np.array(state.u), 0.0, None
+    c, N = system.constraints, system.N
+    force = c.free * np.cos(np.arange(N)**2) / c.coordinate_sizes
+    by = np.vstack([by_state, np.append(force, np.zeros(c.m))])
+    if system.symmetric and not P[c.fixed].count_nonzero():  # as in an iteration
+        with suppress(*NO_FACTORS):
+            system.assemble(u, state.load)
+            system.solver.factorize(u, state.load, state.multipliers)
+            found = np.array([np.concatenate(system.solver.solve(row[:N], row[N:])) for row in by])
+    if found is None:
+        found = tangent_of(state, P[:, :0]).adjoint([1.0], by.T).T
+    soft = found[-1, :N] * c.free
     for beam in system.beams:
         x, y, kernel = u[system.of(beam)], soft[system.of(beam)], beam.kernel
         if kernel.linear:
@@ -435,13 +450,17 @@ def require_regular(state: State, force: Array, soft: Array) -> None:
         raise InputError(f"this state snaps or branches: in one shape it has {soft @ force:.1g} of "
                          f"the stiffness of its material, {resists:.1g}, so that derivatives have "
                          "no bounds. Take another load, or CriticalLoad() as reading")
+    if system.forces.contacts.groups:
+        _require_pressed(system, u, state.load, soft)
+    return found[:-1]
+
+
+def _require_pressed(system, u, load, soft):
+    """Raise InputError where a point just touches an obstacle, and a force (N,) could move it."""
     contacts = system.forces.contacts
-    if not contacts.groups:
-        return
-    largest = np.abs(system.internal_force(u, None, state.load)
+    largest = np.abs(system.internal_force(u, None, load)
                      * system.constraints.coordinate_sizes).max() / system.size
-    for (_, group), (_, x, push, _, gap) in zip(contacts.groups, contacts.pushes(
-            u, None, state.load)):
+    for (_, group), (_, x, push, _, gap) in zip(contacts.groups, contacts.pushes(u, None, load)):
         i = group.first + 2 * np.arange(len(group.weights))[:, None]
         # a point that supports hold can neither lift nor press
         moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))
@@ -452,24 +471,6 @@ def require_regular(state: State, force: Array, soft: Array) -> None:
             raise InputError(f"a point just touches an obstacle, at ({x:.6g}, {y:.6g}): the "
                              "derivative depends on whether a change lifts or presses it. Take a "
                              "load or a place at which it is in contact, or is not")
-
-
-def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
-    """The adjoint (r, N + m) of readings, for products with changes P (N + m, n)."""
-    # Raises InputError if it has no bounds, or depends on the direction.
-    system = state.system.after(state.memory)
-    c, N = system.constraints, system.N
-    force = c.free * np.cos(np.arange(N)**2) / c.coordinate_sizes
-    by, found = np.vstack([by_state, np.append(force, np.zeros(c.m))]), None
-    if system.symmetric and not P[c.fixed].count_nonzero():  # as in an iteration
-        with suppress(*NO_FACTORS):
-            system.assemble(np.array(state.u), state.load)
-            system.solver.factorize(np.array(state.u), state.load, state.multipliers)
-            found = np.array([np.concatenate(system.solver.solve(row[:N], row[N:])) for row in by])
-    if found is None:
-        found = tangent_of(state, P[:, :0]).adjoint([1.0], by.T).T
-    require_regular(state, force, found[-1, :N] * c.free)
-    return found[:-1]
 
 
 def tangent_of(state: State, P: Any) -> Bordered:
@@ -498,3 +499,289 @@ def _along(function, state, z):
             multipliers=state.multipliers + k * step * z[N:])))
 
     return sum(c / step * at(k) for k, c in STENCIL)
+
+
+# eigenvalues as readings
+
+def residual(system: Any, u: Array, multipliers: Array, load: float, memory: Any = None) -> Array:
+    """The equations of statics, (N + m,); those of supports at fixed degrees of freedom."""
+    c = system.constraints
+    force = system.after(memory).internal_force(u, None, load)
+    rest = force - load * system.external_force(u) + c.sparse_jacobian(u, load).T @ multipliers
+    rest[c.fixed] = u[c.fixed] - c.values(load)
+    return np.concatenate([rest, c.constraint(u, load)])
+
+
+class Frozen(NamedTuple):
+    """The derivatives of an eigenvalue: by parameters that of the sum of ``rows`` of a scene.
+    ``by_state`` (N + m,) is that by the displacements and multipliers of the static solution, or
+    None. ``check`` is a function of the sum of the second half of the rows of each parameter,
+    (n,)."""
+
+    rows: Any
+    by_state: Array | None = None
+    check: Any = None
+
+
+class EigenReading:
+    """Base class: an eigenvalue of a scene as a reading of a :class:`~skfem_ancf.Design`.
+
+    Parameters
+    ----------
+    number
+        Its number, from 0.
+    """
+
+    loaded = False
+
+    def __init__(self, number: int = 0) -> None:
+        self.number = require_integer("number", number, 0)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.number}>"
+
+    def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
+        """The value in a scene, and what ``_freeze`` needs."""
+        raise NotImplementedError
+
+    def _freeze(self, scene: Any, found: Any) -> Frozen:
+        """What its derivatives need."""
+        raise NotImplementedError
+
+    def _require_simple(self, values):
+        """Values are sorted; that of the number must differ from its neighbours."""
+        own = values[self.number]
+        for other in (self.number - 1, self.number + 1):
+            if 0 <= other < len(values) and abs(values[other] - own) <= SIMPLE * abs(own):
+                raise InputError(
+                    f"{self!r} is not simple: numbers {min(other, self.number)} and "
+                    f"{max(other, self.number)} are equal to {abs(values[other] / own - 1):.1g}. "
+                    "A multiple eigenvalue has no derivative, as its shapes depend on the "
+                    "direction: use a smooth function, as the sum of both, of differences, or "
+                    "break the symmetry")
+
+
+class Frequency(EigenReading):
+    """An angular frequency, as a reading of a :class:`~skfem_ancf.Design`.
+
+    Parameters
+    ----------
+    number
+        Its number, from 0 for the lowest.
+    loaded
+        About the static solution, with its stress, instead of the reference configuration.
+
+    Examples
+    --------
+    A frequency is proportional to the root of the modulus:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, Design, ElementBeamCable, Frequency, MeshBeam, Scene
+    >>> from skfem_ancf import StVenantKirchhoff
+    >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01)
+    >>> def build(p):
+    ...     material = StVenantKirchhoff(p[0], 0.3, 7800)
+    ...     return Scene(Beam(mesh, ElementBeamCable(5), material, width=0.01)).clamp("left")
+    >>> (omega,), ((by_E,),) = Design(build, [Frequency()])([2e8])
+    >>> bool(abs(by_E * 2e8 / omega - 0.5) < 1e-8)
+    True
+    """
+
+    def __init__(self, number: int = 0, loaded: bool = False) -> None:
+        super().__init__(number)
+        self.loaded = require_flag("loaded", loaded)
+
+    def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
+        c = scene.system.constraints
+        k = min(self.number + 2, max(int(c.free.sum()) - c.m, self.number + 1))
+        # without the estimate of errors of scene.modes, which a design need not repeat
+        modes = eigen.modes(scene.system, scene.state(load=0.0) if state is None else state, k)
+        return float(modes.frequencies[self.number].real), modes
+
+    def _freeze(self, scene: Any, found: Any) -> Frozen:
+        values, system, state = found.eigenvalues, scene.system, found.state
+        mu, omega = values[self.number].real, found.frequencies[self.number].real
+        refuse(found.flutter or not system.symmetric, "the loads have no potential: derivatives of "
+               "frequencies need a symmetric stiffness, so use differences of values")
+        if abs(mu) <= 1e2 * eigen.ROUND_OFF**2 * system.scales.bending_eigenvalue:
+            raise InputError(f"{self!r} is that of a rigid motion, zero for all parameters: give "
+                             "a higher number, or supports")
+        self._require_simple(values.real)
+        shape, factor = found.shapes[self.number].real, 0.5 / omega
+        one = _Quadratic(system, state, shape, mu)
+
+        return Frozen(lambda scene: factor * one.rows(scene.system),
+                      factor * second(state, one.vector) if self.loaded else None)
+
+
+class BucklingLoad(EigenReading):
+    """A factor of linear buckling, as a reading of a :class:`~skfem_ancf.Design`.
+
+    Parameters
+    ----------
+    number
+        Its number, from 0 for the lowest.
+    """
+
+    def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
+        c = scene.system.constraints
+        found = scene.buckling(min(self.number + 2, int(c.free.sum()) - c.m))
+        refuse(len(found.factors) <= self.number, "{!r} does not exist: these loads have {} "
+               "positive factors of buckling", self, len(found.factors))
+        return float(found.factors[self.number]), found
+
+    def _freeze(self, scene: Any, found: Any) -> Frozen:
+        system, factor = scene.system, found.factors[self.number]
+        zero, sizes = np.zeros(system.N), system.constraints.coordinate_sizes
+        rest = residual(system, zero, np.zeros(system.constraints.m), 0.0)[:system.N] * sizes
+        push = np.abs(system.external_force(zero) * sizes).max()
+        if not system.symmetric or system.domains or np.any(
+                np.abs(rest) > eigen.UNSTRESSED * push):
+            raise InputError("derivatives of buckling loads are of beams under loads with a "
+                             "potential, free of stress without them: use CriticalLoad()")
+        self._require_simple(found.factors)
+        free, shape = system.constraints.free, found.shapes[self.number]
+        x, at = shape[free], _tangent(system, zero)
+        du, _, multipliers = at.response()
+        geometric = x @ (at.geometric(at.stresses(du), multipliers, 1.0) @ x)
+        # the geometric stiffness is linear in the stress: strains of second order
+        step = SMALL / np.abs(shape / system.constraints.coordinate_sizes).max()
+        up, down = (_tangent(system, sign * step * shape) for sign in (1.0, -1.0))
+        bent = ((up.B - down.B) @ x) / (2.0 * step)
+        turned = second(State(system, 0.0 * shape, 0.0), np.append(shape, 0.0 * multipliers))
+        a, b = (part[:, 0] for part in Inverse(at).solve_both(
+            (at.CB.T @ bent)[:, None], turned[system.N:, None]))
+        y = _multipliers(at.J, at.multiply(x) + factor * (
+            at.geometric(at.stresses(du), multipliers, 1.0) @ x))
+        settled = system.constraints.values(1.0)
+
+        def rows(scene):
+            system = scene.system
+            if np.any(np.abs(system.constraints.values(1.0) - settled) > 0.0):
+                raise InputError("derivatives of a buckling load by settlements of supports are "
+                                 "not available: use CriticalLoad()")
+            at = _tangent(system, np.zeros(system.N))
+            own = system.external_force(np.zeros(system.N))[free] - (
+                at.B.T @ at.stresses(du) + at.S @ du[free] + at.J.T @ multipliers)
+            K = at.multiply(x) + factor * (at.geometric(at.stresses(du), multipliers, 1.0) @ x)
+            out = np.zeros(system.N + len(y))
+            out[:system.N][free] = x * K + factor * a * own
+            out[system.N:] = 2.0 * y * (at.J @ x) - factor * b * (at.J @ du[free])
+            return out / -geometric
+
+        return Frozen(rows)
+
+
+class CriticalLoad(EigenReading):
+    """The load factor of a limit or bifurcation point of a path, as a reading of a Design.
+
+    Parameters
+    ----------
+    number
+        Its number on the path, from 0.
+    **options
+        As for :meth:`skfem_ancf.Scene.continuation`; ``max_load`` ends the path after the point.
+    """
+
+    def __init__(self, number: int = 0, **options: Any) -> None:
+        super().__init__(number)
+        self.options = {"locate": LOCATE, **options}
+
+    def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
+        points = scene.continuation(**self.options).critical_points
+        refuse(len(points) <= self.number, "{!r} does not exist: the path has {} critical points. "
+               "Follow it further, by steps= or max_load=", self, len(points))
+        return float(points[self.number].load), points[self.number]
+
+    def _freeze(self, scene: Any, found: Any) -> Frozen:
+        system, state, load = scene.system, found.state, found.load
+        refuse(not system.symmetric or system.histories.dissipates, "derivatives of critical loads "
+               "are of scenes with a potential: no follower loads, friction or plasticity")
+        u, l = np.array(state.u), state.multipliers
+        vector = np.append(found.mode, found.critical.multiplier_rate)
+        K, J = matrices_of(system, state)[2::2]
+        by_load = sum(sign * residual(system, u, l, load + sign * LOADED, state.memory)
+                      for sign in (1.0, -1.0)) / (2.0 * LOADED)
+        left, fixed = vector.copy(), system.constraints.fixed
+        left[fixed] = -(K @ found.mode + J.T @ vector[system.N:])[fixed]
+        if found.kind == "limit":
+            factor = -1.0 / (left @ by_load)
+            return Frozen(lambda scene: factor * left * residual(scene.system, u, l, load,
+                                                                 state.memory))
+        none, one = np.zeros((system.N, 0)), _Quadratic(system, state, found.mode, 0.0, vector)
+        border = Bordered([K], sparse.vstack([J, sparse.csr_array(found.mode[None])]),
+                          system.constraints, none)
+        bent = np.append(second(state, vector), 0.0)[:, None]
+        adjoint = border.adjoint([1.0], bent)[:-1, 0]
+        stiffer = sum(sign * one.rows(system, load + sign * LOADED).sum()
+                      for sign in (1.0, -1.0)) / (2.0 * LOADED)
+        factor = -1.0 / (stiffer - adjoint @ by_load)
+        size = np.abs(left * by_load).sum() + np.abs(adjoint * by_load).sum()
+
+        def rows(scene):
+            rest = residual(scene.system, u, l, load, state.memory)
+            return np.concatenate([factor * (one.rows(scene.system) - adjoint * rest),
+                                   left * rest / size])
+
+        return Frozen(rows, check=_require_symmetry)
+
+
+def _require_symmetry(work):
+    if np.any(np.abs(work) > SYMMETRIC):
+        k = int(np.argmax(np.abs(work)))
+        raise InputError(f"parameter {k} disturbs the symmetry of the bifurcation, which becomes a "
+                         "limit point below it: the critical load has no derivative, it falls as "
+                         "the power 2/3 of the disturbance. Start from a disturbed structure")
+
+
+class _Quadratic:
+    """``x . (K - mu M) x + 2 y . J x`` in a state, as a sum of rows (N + m,). x is a shape (N,)
+    with multipliers y (m,), in ``vector``."""
+
+    def __init__(self, system: Any, state: State, x: Array, mu: float,
+                 vector: Array | None = None) -> None:
+        self._state, self._x, self._mu = state, x, mu
+        self.vector = np.append(x, np.zeros(system.constraints.m)) if vector is None else vector
+        if vector is None:
+            at = self._tangent(system, state.load)
+            self.vector[system.N:] = _multipliers(at.J, self._forces(system, at))
+
+    def _tangent(self, system, load):
+        s = self._state
+        return StrainTangent(system.after(s.memory), np.array(s.u), load, s.t, s.multipliers)
+
+    def _forces(self, system, at):
+        free = system.constraints.free
+        out = at.multiply(self._x[free])
+        return out - self._mu * system.mass.multiply(self._x)[free] if self._mu else out
+
+    def rows(self, system: Any, load: float | None = None) -> Array:
+        """The rows for a system with other parameters, at the same displacements."""
+        at, x = self._tangent(system, self._state.load if load is None else load), self._x
+        out, free = 0.0 * self.vector, system.constraints.free
+        out[:system.N][free] = x[free] * self._forces(system, at)
+        out[system.N:] = 2.0 * self.vector[system.N:] * (at.J @ x[free])
+        return out
+
+
+def second(state: State, vector: Array) -> Array:
+    """The second derivative (N + m,) of the equations along a vector (N + m,)."""
+    system = state.system
+    step = BENT / np.abs(vector[:system.N] / system.constraints.coordinate_sizes).max()
+    z = np.concatenate([state.u, state.multipliers])
+
+    def at(k):
+        moved = z + k * step * vector
+        return residual(system, moved[:system.N], moved[system.N:], state.load, state.memory)
+
+    return (16.0 * (at(1) + at(-1)) - 30.0 * at(0) - at(2) - at(-2)) / (12.0 * step**2)
+
+
+def _multipliers(J, forces):
+    """y with ``J^T y = -forces``, (m,)."""
+    J = sparse.csc_array(J)
+    return -spsolve(sparse.csc_array(J @ J.T), J @ forces) if J.shape[0] else np.zeros(0)
+
+
+def _tangent(system, u):
+    return StrainTangent(system, u, 0.0, None, np.zeros(system.constraints.m))

@@ -23,8 +23,7 @@ from ..dynamics.history import state_of
 from ..dynamics.run import integrator_of
 from ..dynamics.sensors import locate, read
 from ..equations.matrices import matrices_of
-from .design import STENCIL, Design, Differences
-from .eigen_readings import residual
+from .design import STENCIL, Design, Differences, residual
 from .linear_model import Factors, rows_of
 from .parameters import Parameters
 
