@@ -34,18 +34,16 @@ from .mesh.mesh_beam import MeshBeam
 from .recovery.resultants import Resultants
 from .results.checks import Checks
 from .results.path import CriticalPoint, Path
-from .results.response import FrequencyResponse
 from .results import Extreme, Reaction, State
 from .scene.cases import Envelope, LoadCases
+from .scene.control import LinearModel, StateSpace, Stepper
 from .scene.design import BucklingLoad, CriticalLoad, Design, Frequency
 from .scene.motion_design import MotionDesign
 from .scene.parameters import Parameters
 from .scene import Frame, Scene
 from .scene.solve import Plan
-from .scene.linear_model import LinearModel, StateSpace
-from .scene.stepper import Stepper
 from .sections import Section
-from .results.modes import Buckling, Modes
+from .results.modes import Buckling, FrequencyResponse, Modes
 from .sweeps import Sweep, sweep
 from .visuals.pyvista import Explorer
 

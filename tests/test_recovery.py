@@ -12,7 +12,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 from skfem_ancf.core.errors import ConvergenceError, NameUnknown
 from skfem_ancf.dynamics import GeneralizedAlpha
 from skfem_ancf.recovery.recovered import Segment
-from skfem_ancf.scene.adapt import strain_error
+from skfem_ancf.scene.solve import strain_error
 
 REFERENCE = np.load(Path(__file__).parent / "data" / "reference_2d.npz")
 NU = 0.3

@@ -21,7 +21,7 @@ from ..equations.matrices import matrices_of
 from ..equations.strain_tangent import Inverse, StrainTangent
 from ..results.state import State
 from ..solvers import eigen
-from .linear_model import Bordered, rows_of
+from .control import Bordered, rows_of
 from .parameters import Parameters
 
 #: Step of the parameters, relative to their size, and a stencil of fourth order.

@@ -23,8 +23,8 @@ from ..dynamics.history import state_of
 from ..dynamics.run import integrator_of
 from ..dynamics.sensors import locate, read
 from ..equations.matrices import matrices_of
+from .control import Factors, rows_of
 from .design import STENCIL, Design, Differences, residual
-from .linear_model import Factors, rows_of
 from .parameters import Parameters
 
 #: Step of the parameters, relative to their size: what it moves of the motion must be small.

@@ -29,22 +29,20 @@ from ..equations.matrices import (SceneMatrices, linear_external_force, linear_f
                                   matrices_of)
 from ..equations.system import System
 from ..results.checks import warn_of, warn_of_points
-from ..results.modes import Buckling, Modes
+from ..results.modes import Buckling, FrequencyResponse, Modes
 from ..results.output import scene_html
 from ..results.path import CriticalPoint, Path
-from ..results.response import FrequencyResponse
 from ..results.state import State
 from ..solvers import continuation, eigen, newton
 from ..solvers.continuation import Point
 from ..visuals.matplotlib import plot_scene
 from ..visuals.pyvista import Explorer, explorer
-from .adapt import DEGREES, GOALS, MOST_ELEMENTS, frequency_errors, solve_adaptive
+from .control import Held, LinearModel, Stepper
 from .design import Gradient
-from .linear_model import LinearModel
 from .model import Entry, Model
 from .quasistatic import StepHistory, Steps, run
-from .solve import Plan, configuration, displacement, make_plan, solve_static
-from .stepper import Held, Stepper
+from .solve import (DEGREES, GOALS, MOST_ELEMENTS, Plan, configuration, displacement,
+                    frequency_errors, make_plan, solve_adaptive, solve_static)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -331,7 +329,7 @@ class Scene(Model):
             see ``state.stability``.
         goal, max_elements, max_degree
             For ``adapt``: the error of the "displacement" or of the "strain", see
-            :func:`skfem_ancf.scene.adapt.solve_adaptive`; limits of refinement.
+            :func:`skfem_ancf.scene.solve.solve_adaptive`; limits of refinement.
 
         Warns
         -----
