@@ -299,14 +299,14 @@ class _Rounds:
         raised = [None if error <= 0.1 * self.tol and k in self._before else self.raised(k)
                   for k, error in enumerate(errors)]
         self._before = {k: e for k, e in enumerate(errors) if self.raised(k) is not None}
-        scene, solved = fine, better
+        scene, self.state = fine, better
         if any(e is None for e in raised):
             marked = _mark(self.scene, state, fine, better, split)
-            scene, solved = self.scene, state
+            scene, self.state = self.scene, state
             if any(e is not None for e in raised) or any(len(m) for m in marked):
-                scene, solved = _changed(self.scene, marked, raised), None
+                scene, self.state = _changed(self.scene, marked, raised), None
         self._refinements = self.done(errors, scene)
-        self.scene, self.state = scene, solved
+        self.scene = scene
 
 
 def _changed(scene, marked=None, elements=None):
