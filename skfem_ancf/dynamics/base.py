@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
 from typing import Any
@@ -13,6 +14,9 @@ from ..equations.system import System
 
 #: Fraction of a step below which accelerations are interpolated.
 NEAR = 0.1
+#: Attributes of a Motion that are stored.
+COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
+           "dissipated", "history", "turns")
 
 
 @dataclass
@@ -57,6 +61,26 @@ class Motion:
     history: Array | None = None
     turns: Array | None = None
     memory: dict[str, Any] | None = None
+
+
+class Motions(Sequence[Motion]):
+    """Motions at n instants, by arrays (n, ...) of :data:`COLUMNS`, and their memory by number."""
+
+    # Objects are made at need: they would take as long as the steps of a small model.
+
+    def __init__(self, columns: dict[str, Array],
+                 memory: Callable[[int], dict[str, Any] | None] = lambda k: None) -> None:
+        self.columns, self._memory = columns, memory
+
+    def __len__(self) -> int:
+        return len(self.columns["t"])
+
+    def __getitem__(self, k: Any) -> Any:
+        row: dict[str, Any] = {
+            name: x[k] if x.ndim > 1 else float(x[k]) for name, x in self.columns.items()}
+        if not row["history"].size:
+            row["history"] = None
+        return Motion(**row, memory=self._memory(k))
 
 
 def interpolate(a: Motion, b: Motion, t: float) -> Motion:

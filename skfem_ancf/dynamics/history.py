@@ -22,7 +22,7 @@ from ..results.output import history_html, report_of_history
 from ..results.state import MaterialPoints, Reaction, SpringForces, State
 from ..visuals.matplotlib import animate, plot_curve, plot_state
 from ..visuals.pyvista import Series
-from .base import Motion, Scheme
+from .base import Motion, Motions, Scheme
 from .sensors import Readings
 
 
@@ -46,9 +46,6 @@ def angular_momentum(system: System, u: Array, v: Array) -> float:
     return float(total)
 
 
-#: Attributes of a Motion that are stored.
-COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
-           "dissipated", "history", "turns")
 #: Number of states whose fields are recovered together.
 TOGETHER = 32
 #: Default number of instants in a plot.
@@ -153,11 +150,7 @@ class History(MaterialPoints, SpringForces):
         last, arrays = self._last
         if last is not None and k == len(self) - 1 and last.t == self.t[k]:
             return state_of(self.system, self.scheme, last, arrays)
-        row = {name: x[k] for name, x in self._columns.items()}
-        row |= {name: float(row[name]) for name in ("t", "before", "dissipated")}
-        if not row["history"].size:
-            row["history"] = None
-        return state_of(self.system, self.scheme, Motion(**row))
+        return state_of(self.system, self.scheme, Motions(self._columns)[k])
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
         """Iterate over the states with these numbers; all by default."""

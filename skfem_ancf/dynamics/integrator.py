@@ -18,7 +18,7 @@ from ..core import I1, Array, ConvergenceError, SupportError, refuse, require_po
 from ..core.words import hints
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
-from .base import Motion, Scheme, in_steps, interpolate
+from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate
 from .collocation import Collocation
 from .time_functions import SAMPLES, TimeFunctions, rates
 from .energy_momentum import EnergyMomentum
@@ -247,24 +247,29 @@ class Integrator:
                     np.zeros((7, s.backend.tables.stresses.size)))
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
-            block: tuple[int, int] | None = None) -> list[Motion]:
+            block: tuple[int, int] | None = None) -> Motions:
         """Take up to ``n`` steps from the Motion ``y`` at ``start + first dt``; fewer if one fails.
         Functions of time are sampled for all steps ``range(*block)`` at once; by default for
         these."""
         s, begun = self.system, y.t if start is None else start
         given = self._functions.of(begun, dt, (first, first + n), self.limit, block)
         lasting = s.histories.lasting
-        rows, multipliers = np.full((n, 4, s.N), np.nan), np.empty((n, 2, self.m))
+        rows, multipliers = np.empty((n, 4, s.N)), np.empty((n, 2, self.m))
         memories = np.full((n, 1 + (s.histories.values.size if lasting else 0)), np.nan)
         kernel, data, points = self._begin(y, dt, n, given)
-        done = self._call(kernel, y, dt, (rows, memories[:, :1]), self._rule, data, self._state,
+        done = self._call(kernel, y, dt, (rows, memories[:, 0]), self._rule, data, self._state,
                           self._work, memories, rows, multipliers, points)
-        starts = [np.array([y.u, y.v]), *rows[:, :2]]  # of the steps, for the next guess
-        return [Motion(begun + dt * (first + k + 1), u, v, a, w, m, force, dt, float(kept[0]),
-                       kept[1:] if lasting else y.history, y.turns,
-                       {"start": starts[k], "points": points[k]} if points.size else None)
-                for k, (u, v, a, w), (m, force), kept in zip(
-                    range(done), rows, multipliers, memories)]
+        history = memories[:, 1:] if lasting or y.history is None else np.array([y.history] * done)
+        turns = np.empty(0) if y.turns is None else y.turns
+        columns = (begun + dt * np.arange(first + 1, first + done + 1), *rows.swapaxes(0, 1),
+                   *multipliers.swapaxes(0, 1), np.full(done, dt), memories[:, 0], history,
+                   np.broadcast_to(turns, (done, len(turns))))
+
+        def memory(k):  # the start of a step, for the next guess
+            start = np.array([y.u, y.v]) if k % done == 0 else rows[k % done - 1, :2]
+            return {"start": start, "points": points[k % done]} if points.size else None
+
+        return Motions({name: x[:done] for name, x in zip(COLUMNS, columns)}, memory)
 
     def _begin(self, y, dt, n, given):
         """The kernel, its functions of time, and an array for what a step has at its points."""
@@ -283,8 +288,8 @@ class Integrator:
     def _call(self, function: Callable, y: Motion, dt: float, out: tuple[Array, Array],
               *args: Any) -> int:
         """Call a compiled function that takes steps; returns how many succeeded."""
-        # On Ctrl-C it counts the steps that are complete in the arrays ``out`` of NaN, the first of
-        # which has the displacements, and sets ``stopped``.
+        # On Ctrl-C it counts the steps that are complete, and sets ``stopped``. ``out`` has the
+        # displacements, and a number for each step that is NaN until the step is complete.
         s, state, before, rows = self.system, self._state, np.array(self._state), out[0]
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
@@ -300,8 +305,7 @@ class Integrator:
             self.forget()
             if not isinstance(error, KeyboardInterrupt):
                 raise
-            left = [np.isnan(x.reshape(len(x), -1)).any(axis=1) for x in out]
-            done, self.stopped = int(np.argmax(np.append(left[0] | left[1], True))), True
+            done, self.stopped = int(np.argmax(np.append(np.isnan(out[1]), True))), True
         done, self._lost = s.constraints.first_lost(rows[:done, 0])
         if done and s.forces.contacts.sweeps:
             u, v = (np.concatenate([[x], rows[:done, k]]) for k, x in enumerate((y.u, y.v)))

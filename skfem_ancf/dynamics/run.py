@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, ulp
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,8 @@ from ..core import (AncfError, Array, CheckpointError, InputError, ModelWarning,
                     shown, warn)
 from ..equations.system import System
 from ..results.state import State
-from .base import Motion, Scheme, in_blocks, interpolate, same_scheme
-from .history import COLUMNS, History, state_of
+from .base import COLUMNS, Motion, Scheme, in_blocks, interpolate, same_scheme
+from .history import History, state_of
 from .integrator import DEPTH, Integrator, StageIntegrator, TimeStepFailed
 from .sensors import Recorder, Sensor
 from .time_functions import Lookahead
@@ -124,8 +123,6 @@ MAX_STEPS = 10**9
 #: The smallest tolerance of the automatic step size.
 MIN_RTOL = 1e-12
 EPS = np.finfo(float).eps
-#: The columns of a motion, and the place of those of contact, which may be missing.
-_columns, HISTORY, NONE = attrgetter(*COLUMNS), COLUMNS.index("history"), np.zeros(0)
 #: Fraction of a step below which an instant is interpolated; so short a step is all round-off.
 CLOSE = 1e-6
 #: Degrees of freedom times steps of a block, so that progress bars and Ctrl-C react in time.
@@ -216,7 +213,7 @@ class Run:
         self._times = task.t_start, *task.breakpoints, task.t_end
         self._segment = self._n = self._next = self.steps = self.rejected = self._stuck = 0
         self._size = FIRST * task.span if task.dt is None else task.dt
-        self._stored: list[tuple[Any, ...]] = []
+        self._stored: list[dict[str, Array]] = []  # columns, each of some instants
         self._turns = Turns(system)
         self.recorder = Recorder(sensors, system, lambda y: state_of(system, scheme, y))
         self.longest: int | None = None
@@ -338,13 +335,14 @@ class Run:
             raise KeyboardInterrupt
         if not taken:
             return False
-        turns = self._turns.follow(self.y.turns, np.array([y.u for y in taken]))
-        for new, angles in zip(taken, turns):
-            new.turns = angles
-        taken[-1].t = self._time(self._n + len(taken))
+        taken.columns["turns"] = self._turns.follow(self.y.turns, taken.columns["u"])
+        taken.columns["t"][-1] = self._time(self._n + len(taken))
         self.recorder.record(taken)
-        for old, new in zip([self.y, *taken], taken):
-            self._store(old, new)
+        if self.task.t_eval is None:
+            self._stored.append(taken.columns)
+        else:
+            for old, new in zip([self.y, *taken], taken):
+                self._store(old, new)
         self._n, self.steps, self.y = self._n + len(taken), self.steps + len(taken), taken[-1]
         if self.integrator.stopped:
             raise KeyboardInterrupt
@@ -417,16 +415,13 @@ class Run:
             t = float(wanted[self._next])
             self._append(new if t == new.t else self._between(old, new, t))
             self._next += 1
-        if self.event is not None and (not self._stored or self._stored[-1][0] < new.t):
+        if self.event is not None and (not self._stored or self._stored[-1]["t"][-1] < new.t):
             self._append(new)
 
     def _append(self, y):
-        row = _columns(y)
-        if y.history is None:
-            row = *row[:HISTORY], NONE, *row[HISTORY + 1:]
-        if self.task.t_eval is not None:  # copy, to free the rest of the block
-            row = tuple(map(np.array, row))
-        self._stored.append(row)
+        none = np.zeros(0)  # copies free the rest of a block
+        self._stored.append({name: np.array([none if x is None else x]) for name, x in (
+            (name, getattr(y, name)) for name in COLUMNS)})
 
     def _between(self, old, new, t):
         """The motion within a step, by a shorter step from the same start."""
@@ -453,12 +448,12 @@ class Run:
     def columns(self) -> dict[str, Array]:
         """The stored arrays (nt, ...) by the names of the attributes of Motion."""
         if self._stored:
-            return dict(zip(COLUMNS, map(np.array, zip(*self._stored))))
+            return {name: np.concatenate([x[name] for x in self._stored]) for name in COLUMNS}
         return {name: np.zeros((0, *np.shape([] if name == "history" else getattr(self.y, name))))
                 for name in COLUMNS}
 
     def history(self) -> History:
-        at_end = bool(self._stored) and self._stored[-1][0] == self.y.t
+        at_end = bool(self._stored) and self._stored[-1]["t"][-1] == self.y.t
         taken = self.integrator
         return History(self.system, self.scheme, self.columns(),
                        (self.y, self.arrays()) if at_end else (None, None),
@@ -479,7 +474,7 @@ class Run:
     def load(self, y: Motion, arrays: dict[str, Any], columns: dict[str, Array]) -> None:
         """Restore a stopped run."""
         self.y = y
-        self._stored = list(zip(*(columns[name] for name in COLUMNS)))
+        self._stored = [columns] if len(columns["t"]) else []
         self.integrator.load(arrays)
         if self._sizes is not None:
             self._sizes.load(arrays)

@@ -15,8 +15,8 @@ from ..core import (Array, ArrayLike, ConvergenceError, Immutable, InputError, I
                     ModelWarning, refuse, require_finite, require_flag, require_increasing,
                     require_integer, require_option, require_positive, warn)
 from ..core.progress import progress_bar
-from ..dynamics.base import Motion, Scheme
-from ..dynamics.history import COLUMNS, History, state_of
+from ..dynamics.base import COLUMNS, Motion, Scheme
+from ..dynamics.history import History, state_of
 from ..dynamics.sensors import Recorder, Sensor
 from ..equations.stability import largest_displacement, position_weights
 from ..equations.system import System
