@@ -475,11 +475,18 @@ def unit_of(field: Field, units: tuple[str, str] | None) -> str:
     >>> [unit_of(FIELDS["von_mises"], units) for units in (None, ("N", "mm"), ("lbf", "in"))]
     ['force / area', 'MPa', 'lbf/in²']
     """
+    return field.unit if units is None else unit_in(units, field.unit)
+
+
+def unit_in(units: tuple[str, str] | None, kind: str) -> str:
+    """The unit of a "force", "length", "moment", "force / area" or "energy / volume"; "" if those
+    of force and length are not known."""
     if units is None:
-        return field.unit
-    area = PRESSURES.get(units, f"{units[0]}/{units[1]}²")
-    return {"length": units[1], "force / area": area, "energy / volume": area}.get(
-        field.unit, field.unit)
+        return ""
+    force, length = units
+    area = PRESSURES.get(units, f"{force}/{length}²")
+    return {"force": force, "length": length, "moment": f"{force} {length}", "force / area": area,
+            "energy / volume": area}.get(kind, kind)
 
 
 def with_unit(text: str, unit: str) -> str:

@@ -20,12 +20,12 @@ from ..core import (AncfError, Array, CallbackError, InputError, StrPath, requir
                     require_integer, require_path, require_text)
 from ..core.archive import output_file
 from ..io import save_vtu, to_xarray
-from ..recovery.fields import DRAWN, PRESSURES, find_field, no_value, units_of, values_on_grid
+from ..recovery.fields import DRAWN, find_field, no_value, unit_in, units_of, values_on_grid
 from ..recovery.grids import layout, values_of_domain
 from ..visuals import diagrams, matplotlib, pyvista
-from ..visuals.diagrams import ROOM, lines_of
+from ..visuals.diagrams import KINDS, ROOM, lines_of
 from ..visuals.matplotlib import dress, new_axes, plot_scene
-from ..visuals.scenery import rounded, symbols_of, unit_of_load, unit_of_resultant
+from ..visuals.scenery import rounded, symbols_of, unit_of_load
 from .checks import has_strength, materials_of
 
 #: Resolution of pictures in notebooks, in dots per inch.
@@ -42,13 +42,9 @@ def picture(draw: Callable[[], Any], dpi: int = SCREEN) -> str:
     return f'<img src="data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"/>'
 
 
-def _words(text):
+def words(text: str) -> str:
+    """A text in HTML as it is."""
     return f"<pre>{html.escape(text)}</pre>"
-
-
-def state_html(state: Any) -> str:
-    """The text of a State, and its picture."""
-    return _words(str(state)) + picture(state.plot)
 
 
 def scene_html(scene: Any) -> str:
@@ -60,26 +56,14 @@ def scene_html(scene: Any) -> str:
     texts = [(kind, " ".join(repr(thing).split())) for kind, thing in rows]
     table = "".join(f"<tr><td>{kind}</td><td>" + html.escape(
         text if len(text) <= 160 else text[:157] + "...") + "</td></tr>" for kind, text in texts)
-    return (_words(repr(scene)[1:-1]) + f"<table>{table}</table>"
+    return (words(repr(scene)[1:-1]) + f"<table>{table}</table>"
             + picture(lambda: scene.state().plot("displacement", colorbar=False, title="",
                                                   cmap="Greys")))
 
 
-def path_html(path: Any) -> str:
-    """The text of a Path, and its load against the largest nodal displacement."""
-    def draw():
-        state = path.state(len(path) - 1)
-        beam = max(state.beams, key=lambda b: np.max(np.abs(state.u_of(b))))
-        moved = state.u_of(beam).reshape(-1, beam.nd)[:, :2]
-        node, component = np.unravel_index(np.argmax(np.abs(moved)), moved.shape)
-        return path.plot(beam.mesh.p[:, node], int(component), beam)
-
-    return _words(repr(path)[1:-1]) + picture(draw)
-
-
 def history_html(history: Any) -> str:
     """The text of a History, and its energies over time."""
-    return _words(repr(history)[1:-1]) + (
+    return words(repr(history)[1:-1]) + (
         picture(lambda: history_picture(history)) if len(history) > 1 else "")
 
 
@@ -94,7 +78,8 @@ def history_picture(history: Any) -> Any:
 
 
 #: Fields whose largest values are listed, with their units.
-LISTED = {"displacement": "length", "S_xx": "stress", "von_mises": "stress", "utilisation": ""}
+LISTED = {"displacement": "length", "S_xx": "force / area", "von_mises": "force / area",
+          "utilisation": ""}
 #: Rows of a table at most; instants of a motion that are compared.
 ROWS, INSTANTS = 40, 50
 #: Sum of all forces over the largest of them in an equilibrium.
@@ -272,11 +257,7 @@ class _Page:
 
     def number(self, value: float, kind: str = "") -> tuple[str]:
         """A number with the unit of a length, force, moment or stress, as a cell."""
-        force, length = self.units or ("", "")
-        unit = "" if self.units is None else {
-            "length": length, "force": force, "moment": f"{force} {length}",
-            "stress": PRESSURES.get(self.units, f"{force}/{length}²"), "": ""}[kind]
-        return (rounded(value + 0.0, unit),)
+        return (rounded(value + 0.0, unit_in(self.units, kind)),)
 
     def parts(self) -> list[str]:
         """All sections of the page."""
@@ -293,7 +274,7 @@ class _Page:
         findings = state.checks.findings
         return [
             _text(f"{how[0].upper()}{how[1:]}. Load factor {state.load:g}.{units}"),
-            "<h2>Model</h2>", model, self._bodies(), self._materials(),
+            "<h2>Model</h2>", model, self._model(),
             "<h2>Loads and supports</h2>", self._actions(),
             "<h2>Reactions</h2>", self._reactions(),
             "<h2>Results</h2>", self._extremes(), *(
@@ -306,42 +287,39 @@ class _Page:
             *self._integrated(),
             "<h2>Findings</h2>", *([_text(text, "bad") for text in findings]
                                    or [_text("None: the solution is within the range of its mesh "
-                                             "and materials.")]), *self._recovered(),
+                                             "and materials.")]),
+            *(_text(f"Stress of beam {name} is that of its elements: {why}.", "note")
+              for name, why in state.recovered.items() if why),
             _text(f"skfem-ancf {version('skfem-ancf')}, scikit-fem {version('scikit-fem')}, NumPy "
                   f"{np.__version__}, SciPy {version('scipy')}, Python "
                   f"{platform.python_version()}. {self.system.N} degrees of freedom. "
                   f"{date.today().isoformat()}", "note")]
 
-    def _bodies(self):
-        rows = []
-        for beam in self.state.beams:
-            mesh, weighs = beam.mesh, all(layer.density is not None
-                                          for layer in beam.across.layers)
-            length = self.number(float(np.sum(mesh.lengths)), "length")
-            rows.append((name_of(self.system, beam), length, self.number(mesh.height, "length"),
-                         str(beam.section).strip("<>"),
-                         f"{mesh.nelements} × {type(beam.element).__name__}",
-                         (f"{beam.total_mass:.4g}",) if weighs else "–"))
-        others = [(name_of(self.system, one), repr(one).strip("<>"))
-                  for one in self.system.members[len(rows):]]
-        return _table(("beam", "length", "height", "section", "elements", "mass"), rows) + _table(
-            ("body", ""), others)
-
-    def _materials(self):
+    def _model(self):
+        """Tables of beams, of bodies and domains, and of materials."""
         def cell(value, kind):
             return "–" if value is None else "f(x, y)" if callable(value) else (
                 self.number(value, kind))
 
         def strength(given):
             return "–" if given is None else (" / ".join(
-                self.number(x, "stress")[0] for x in given),) if isinstance(given, tuple) else (
-                    self.number(given, "stress"))
+                self.number(x, "force / area")[0] for x in np.atleast_1d(given)),)
 
-        every = dict.fromkeys(one for member in self.system.members for one in materials_of(member))
-        return _table(("material", "E", "ν", "density", "strength"), [
+        beams, members = self.state.beams, self.system.members
+        every = dict.fromkeys(one for member in members for one in materials_of(member))
+        return _table(("beam", "length", "height", "section", "elements", "mass"), [
+            (name_of(self.system, beam), self.number(float(np.sum(beam.mesh.lengths)), "length"),
+             self.number(beam.mesh.height, "length"), str(beam.section).strip("<>"),
+             f"{beam.mesh.nelements} × {type(beam.element).__name__}",
+             (f"{beam.total_mass:.4g}",) if all(
+                 layer.density is not None for layer in beam.across.layers) else "–")
+            for beam in beams]
+        ) + _table(("body", ""), [
+            (name_of(self.system, one), repr(one).strip("<>")) for one in members[len(beams):]]
+        ) + "\n" + _table(("material", "E", "ν", "density", "strength"), [
             (f"{getattr(m, 'title', '') or type(m).__name__}, plane {m.plane}",
-             cell(grade or m.E, "stress"), (f"{m.nu:g}",), cell(density, ""), strength(m.strength))
-            for m, grade, density in every])
+             cell(grade or m.E, "force / area"), (f"{m.nu:g}",), cell(density, ""),
+             strength(m.strength)) for m, grade, density in every])
 
     def _actions(self):
         rows = []
@@ -423,13 +401,12 @@ class _Page:
         size = {name: max(np.max(np.abs(one[name])) for one in lines) for name in "NQM"}
         size["N"] = size["Q"] = max(size["N"], size["Q"])
         for name in "NQM":
-            unit = unit_of_resultant(name, self.units)
             for what, pick in (("maximum", np.argmax), ("minimum", np.argmin)):
                 line = lines[int(pick([one[name][pick(one[name])] for one in lines]))]
                 k = int(pick(line[name]))
                 value = float(line[name][k])
                 value *= abs(value) > ZERO * size[name]
-                rows.append((f"{what} {name}", (rounded(value + 0.0, unit),),
+                rows.append((f"{what} {name}", self.number(value, KINDS[name]),
                              _pair(line["x"][:, k]), name_of(self.system, line["beam"])))
         points = np.hstack([line["x"] for line in lines])
         width, height = np.ptp(points, axis=1) + 2.0 * ROOM * np.max(np.ptp(points, axis=1))
@@ -447,11 +424,6 @@ class _Page:
                             f"elements, with its errors: {why}." + (
                                 " The exact ones are zero." if why.endswith("no load") else ""),
                             "note")
-
-    def _recovered(self):
-        for name, why in self.state.recovered.items():
-            if why:
-                yield _text(f"Stress of beam {name} is that of its elements: {why}.", "note")
 
 
 def _pair(x):
@@ -566,7 +538,9 @@ class Output:
             raise undefined
         return [one for one, _ in sorted(found, key=lambda pair: -pair[1])[:count]]
 
-    _repr_html_ = state_html
+    def _repr_html_(self):
+        return words(str(self)) + picture(self.plot)
+
     save = save_vtu
     to_xarray = to_xarray
     to_pyvista = pyvista.to_pyvista

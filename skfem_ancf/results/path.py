@@ -11,7 +11,7 @@ import numpy as np
 from ..core import Array, require_index
 from ..equations.system import System
 from ..visuals.matplotlib import plot_path
-from .output import path_html
+from .output import picture, words
 from .state import MaterialPoints, State
 
 
@@ -95,7 +95,16 @@ class Path(MaterialPoints):
                 f"{len(self.bifurcation_points())} bifurcation points, {self.iterations} "
                 f"iterations, relative error {self.error.max():.1g}>")
 
-    _repr_html_ = path_html
+    def _repr_html_(self):
+        """The text, and the load against the largest nodal displacement."""
+        def draw():
+            state = self.state(len(self) - 1)
+            beam = max(state.beams, key=lambda b: np.max(np.abs(state.u_of(b))))
+            moved = state.u_of(beam).reshape(-1, beam.nd)[:, :2]
+            node, component = np.unravel_index(np.argmax(np.abs(moved)), moved.shape)
+            return self.plot(beam.mesh.p[:, node], int(component), beam)
+
+        return words(repr(self)[1:-1]) + picture(draw)
 
     def state(self, k: int) -> State:
         """Point ``k`` as a State."""

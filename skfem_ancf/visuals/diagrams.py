@@ -8,12 +8,14 @@ import numpy as np
 
 from ..beam import WhichBeam, select_beam
 from ..core import Array, StrPath, refuse, require_flag, require_like, require_option
-from ..recovery.fields import units_of, with_unit
+from ..recovery.fields import unit_in, units_of, with_unit
 from ..recovery.grids import grids
 from .matplotlib import dress, new_axes, page
-from .scenery import GHOST, INK, MUTED, Sketch, rounded, symbols_of, unit_of_resultant
+from .scenery import GHOST, INK, MUTED, Sketch, rounded, symbols_of
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
+#: What they are.
+KINDS = {"N": "force", "Q": "force", "M": "moment"}
 
 #: Colours of positive and negative section forces on the structure.
 SIGNS = "#2f6fa8", "#c1442e"
@@ -78,8 +80,14 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
     if on == "auto":
         frame = getattr(state.system.constraints, "frame", None)
         on = "length" if frame is None and len(beams) == 1 else "structure"
-    if axes is None:
-        axes = _new_axes(beams, on)
+    if axes is None and on == "length":
+        axes = new_axes((6.0, 5.4), 3, 1, sharex=True)
+    elif axes is None:  # below each other, on a high structure beside each other
+        box = np.ptp(np.hstack([b.mesh.p for b in beams]), axis=1)
+        width, height = box + 2.0 * ROOM * max(box)
+        w = min(4.2, 6.0 * width / height)
+        axes = new_axes((7.0, 21.0 * height / width + 2.0), 3, 1) if height < 0.45 * width else (
+            new_axes((3.0 * w, w * height / width + 1.1), 1, 3))
     axes = [axes] if not isinstance(axes, (list, tuple, np.ndarray)) else list(
         np.array(axes, dtype=object).ravel())
     refuse(len(axes) != 3, "axes must be three matplotlib Axes, got {}", len(axes))
@@ -92,18 +100,6 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
         axes[0].set_title(title, loc="left", fontsize=10, color=INK)
     save(axes[0])
     return axes
-
-
-def _new_axes(beams, on):
-    """Three axes: below each other, on a high structure beside each other."""
-    if on == "length":
-        return new_axes((6.0, 5.4), 3, 1, sharex=True)
-    (width, height), size = (box := np.ptp(np.hstack([b.mesh.p for b in beams]), axis=1)), max(box)
-    aspect = (height + 2.0 * ROOM * size) / (width + 2.0 * ROOM * size)
-    if aspect < 0.45:
-        return new_axes((7.0, 21.0 * aspect + 2.0), 3, 1)
-    w = min(4.2, 6.0 / aspect)
-    return new_axes((3.0 * w, w * aspect + 1.1), 1, 3)
 
 
 def _over_length(axes, state, beams, recover):
@@ -119,7 +115,7 @@ def _over_length(axes, state, beams, recover):
     for ax, (name, label) in zip(axes, _ROWS):
         ax.axhline(0.0, color=MUTED, lw=0.6)
         dress(ax, None, with_unit("arc length $s$", units[1] if units else "") * (ax is axes[2]),
-              with_unit(label, unit_of_resultant(name, units)))
+              with_unit(label, unit_in(units, KINDS[name])))
         ax.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
         size = max(map(abs, ax.get_ylim()))
         if size < 1e-9 * max(max(map(abs, other.get_ylim())) for other in ax.figure.axes):
@@ -168,7 +164,7 @@ def _on_structure(axes, state, beams, recover):
         Sketch(ax, np.zeros_like(state.u), points).draw(supports)
         if scale:
             _label(ax, lines, name, -scale if name == "M" else scale, LABELLED * largest, size,
-                   unit_of_resultant(name, units))
+                   unit_in(units, KINDS[name]))
         (x0, y0), (x1, y1) = low - ROOM * size, high + ROOM * size
         ax.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1), yticks=[])
         dress(ax, label + " = 0" * (not scale), with_unit("x", units[1] if units else ""), "")

@@ -250,7 +250,15 @@ def frame(ax: Any, scenery: Scenery, wide: bool) -> None:
         box = around(scenery.every[:, :2].T)
         room = 0.1 * np.max(np.ptp(box, axis=1)) * np.array([[-1.0], [1.0]])
         ax.update_datalim(box.mean(axis=1) + room)
-    ax.update_datalim(scenery.near_walls)
+    # obstacles of the last state beside, above or below the bodies
+    points, walls = scenery.every[:, :2].T, scenery.walls[-1]
+    a, along = walls[:, 0], walls[:, 1] - walls[:, 0]
+    off = np.sum((around(points).mean(axis=1) - a) * along, axis=1)
+    part = np.clip(off / np.maximum(np.sum(along**2, axis=1), 1e-300), 0.0, 1.0)
+    walls = np.concatenate([walls.reshape(-1, 2), a + part[:, None] * along])
+    far, near = ((box[:, 0] <= walls) & (walls <= box[:, 1])
+                 for box in (around(points, WIDE), around(points)))
+    ax.update_datalim(walls[np.all(far, axis=1) & np.any(near, axis=1)])
     ax.set_aspect("equal")
     ax.margins(AROUND if len(scenery.walls[0]) and not wide else 0.04)
     ax.autoscale_view()

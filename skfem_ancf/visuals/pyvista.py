@@ -104,34 +104,29 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
     walls = outlines(state, box)
     names = [grid.name for grid in found] + [f"obstacle {k}" for k in range(len(walls))]
     names += ["contact"] * may_touch(state)
-    blocks = [None] * len(names) if out is None else _blocks_of(out, names)
+    blocks = [None] * len(names)
+    if out is not None:
+        several = isinstance(out, pv.MultiBlock)
+        if not several and not isinstance(out, pv.UnstructuredGrid):
+            raise InputError(f"out must be a mesh that to_pyvista returned, got {shown(out)}")
+        blocks, known = (list(out), list(out.keys())) if several else ([out], names[:1])
+        refuse(known != names, "out must be of the same scene: it has {}, the state {}", known,
+               names)
     bodies = [_fill(block, grid, body_of(grid, wanted, undeformed, fields is None), facts)
               for block, grid in zip(blocks, found)]
-    for block, wall in zip(blocks[len(found):], walls):
-        bodies.append(_lines(wall))
-        if block is not None:
-            block.copy_from(bodies[-1])
+    others = [_lines(wall) for wall in walls]
     if may_touch(state):
         touch = None if undeformed else touching(state)
-        bodies.append(pv.PolyData() if touch is None else pv.PolyData(in_space(touch.points)))
+        others.append(pv.PolyData() if touch is None else pv.PolyData(in_space(touch.points)))
         for name, values in ({} if touch is None else touch.arrays).items():
-            bodies[-1].point_data[name] = values
-        if blocks[-1] is not None:
-            blocks[-1].copy_from(bodies[-1])
+            others[-1].point_data[name] = values
+    for block, other in zip(blocks[len(found):], others):
+        bodies.append(other)
+        if block is not None:
+            block.copy_from(other)
     if out is None:
         out = pv.MultiBlock(dict(zip(names, bodies))) if len(names) > 1 else bodies[0]
     return out
-
-
-def _blocks_of(mesh, names):
-    """The blocks of a mesh of members with these names."""
-    pv = _pyvista()
-    several = isinstance(mesh, pv.MultiBlock)
-    if not several and not isinstance(mesh, pv.UnstructuredGrid):
-        raise InputError(f"out must be a mesh that to_pyvista returned, got {shown(mesh)}")
-    blocks, known = (list(mesh), list(mesh.keys())) if several else ([mesh], names[:1])
-    refuse(known != names, "out must be of the same scene: it has {}, the state {}", known, names)
-    return blocks
 
 
 def _fill(block, grid, body, facts):

@@ -18,7 +18,7 @@ from ..actions.symbols import LOADS, Symbol
 from ..beam import Layout
 from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar, require_flag,
                     require_positive, require_unmasked, shown)
-from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_of, units_of,
+from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_in, unit_of, units_of,
                                values_on_grid, with_unit)
 from ..recovery.grids import Grid, grids, in_space
 
@@ -99,16 +99,10 @@ class _Solid:
 
 
 def _values(field, grid):
+    if grid.values is None:
+        raise no_value(field)
     values = field.of(grid.values)
     return values if field.components == 1 else np.sqrt(np.sum(values**2, axis=0))
-
-
-def _coloured(grid, field):
-    """The drawn quads of a domain, or None where the field is not defined."""
-    try:
-        return None if grid.values is None else _Solid(grid, field)
-    except AncfError:
-        return None
 
 
 def _thickness(thickness, bodies):
@@ -181,9 +175,12 @@ class Scenery:
             found = [grid._replace(u=self.scale * grid.u) for grid in found]
             self.frames.append([_Body(grid, state, beam, subdivide[0], self.field, self.scale)
                                 for grid, beam in zip(found, state.beams)])
-            others = [(grid, _coloured(grid, self.field)) for grid in found[len(state.beams):]]
-            self.frames[-1] += [solid for _, solid in others if solid is not None]
-            self.rigid.append([grid for grid, solid in others if solid is None])
+            self.rigid.append([])
+            for grid in found[len(state.beams):]:
+                try:
+                    self.frames[-1].append(_Solid(grid, self.field))
+                except AncfError:  # a rigid body, or the field is not defined there
+                    self.rigid[-1].append(grid)
         self.beams = [body for frame in self.frames for body in frame]
         if isinstance(thickness, str) and thickness == "auto" and any(map(may_touch, states)):
             thickness = 1.0  # thicker sections would enter each other
@@ -217,18 +214,6 @@ class Scenery:
         box = around(self.every[:, :2].T, self.margin)
         return [np.concatenate([np.zeros((0, 2, 2)), *outlines(state, box)])
                 for state in self._states]
-
-    @property
-    def near_walls(self) -> Array:
-        """Points of obstacles of the last frame beside, above or below the bodies, (n, 2)."""
-        points, walls = self.every[:, :2].T, self.walls[-1]
-        a, along = walls[:, 0], walls[:, 1] - walls[:, 0]
-        off = np.sum((around(points).mean(axis=1) - a) * along, axis=1)
-        part = np.clip(off / np.maximum(np.sum(along**2, axis=1), 1e-300), 0.0, 1.0)
-        walls = np.concatenate([walls.reshape(-1, 2), a + part[:, None] * along])
-        wide, narrow = ((box[:, 0] <= walls) & (walls <= box[:, 1])
-                        for box in (around(points, WIDE), around(points)))
-        return walls[np.all(wide, axis=1) & np.any(narrow, axis=1)]
 
     def beam_points(self, frames: Iterable[int], undeformed: bool = False) -> Array:
         """Points of the beams of frames, shape (2, n), deformed or not."""
@@ -295,11 +280,6 @@ class Scenery:
                         if self.field.signed else "viridis")
 
 
-def unit_of_resultant(name: str, units: tuple[str, str] | None) -> str:
-    """The unit of N, Q or M; "" if the scene has no units."""
-    return "" if units is None else units[0] if name in "NQ" else f"{units[0]} {units[1]}"
-
-
 def rounded(value: float, unit: str) -> str:
     """A number with four digits and its unit: N, kN or MN, and Pa, MPa or GPa."""
     if unit == "Pa" and abs(value) >= 1e5:
@@ -343,8 +323,7 @@ def unit_of_load(symbol: Symbol, units: tuple[str, str] | None) -> str:
     """The unit of a force, per length or area where it is distributed, or moment; "" if unknown."""
     if units is None or symbol.kind not in ("force", "moment"):
         return ""
-    unit = unit_of_resultant("N" if symbol.kind == "force" else "M", units)
-    return unit + f"/{units[1]}" * (symbol.per > 0) + "²" * (symbol.per == 2)
+    return unit_in(units, symbol.kind) + f"/{units[1]}" * (symbol.per > 0) + "²" * (symbol.per == 2)
 
 
 class Sketch:
@@ -378,9 +357,17 @@ class Sketch:
         largest = max((abs(s.value) for s in one.values() if s.kind == "force" and len(s.at) == 1),
                       default=0.0) or 1.0
         for s in sorted(one.values(), key=lambda s: s.kind in NOTES or len(s.at) > 1):
-            if s.value or s.kind not in LOADS:
-                getattr(self, "_" + s.kind.replace(" ", "_"))(
-                    s, np.array([place(self.u) for place in s.at]), largest)
+            if not s.value and s.kind in LOADS:
+                continue
+            at, mass = np.array([place(self.u) for place in s.at]), s.kind == "mass"
+            if mark := {"joint": "o" if s.text == "hinge" else "s", "mass": "o",
+                        "control": "D"}.get(s.kind):
+                self._mark(mark, at[0], s.kind, INK if mass else "white")
+            elif s.kind not in NOTES:
+                getattr(self, "_" + s.kind.replace(" ", "_"))(s, at, largest)
+            if s.kind in (*NOTES, "mass", "control", "torsional spring"):
+                self._beside(f"{s.text}{s.value:.6g}" if mass else s.text, at[0], LOAD if (
+                    s.kind in LOADS) else INK if mass else HOLD, s.kind)
 
     def names(self, places: Iterable[tuple[str, Array]]) -> None:
         """Write names at positions (2,)."""
@@ -428,14 +415,14 @@ class Sketch:
         self._arrow(foot, tip, kind=s.kind, color=MUTED)
         self._text(s.text + rounded(abs(s.value), ""), tip, tip - foot, MUTED, s.kind)
 
-    def _moment(self, s, at, largest, color=LOAD):
+    def _moment(self, s, at, largest):
+        motor, color = s.kind == "motor", HOLD if s.kind == "motor" else LOAD
         angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
         arc = at[0] + 1.5 * SIZE * self.size * np.column_stack([np.cos(angle), np.sin(angle)])
         self._arrow(*arc, kind=s.kind, color=color)
-        self._beside(s.text or self._value(s), at[0], color, s.kind)
+        self._beside("angle(t)" if motor else s.text or self._value(s), at[0], color, s.kind)
 
-    def _eigenstrain(self, s, at, largest):
-        self._beside(s.text, at[0], LOAD, s.kind)
+    _motor = _moment
 
     def _beside(self, text, at, color, kind):
         """Write in a corner about a position, far from bodies and other texts."""
@@ -468,8 +455,12 @@ class Sketch:
             return self._mark("s", base, s.kind)
         if single or "angle" not in held:  # upright, or sideways where only x is held
             x, y = (0.0, 1.0 if y > 0.7 else -1.0) if "y" in held else (1.0 if x > 0.7 else -1.0, 0)
-        d, across = np.array([x, y]), np.array([-y, x])
-        wide = max(1.2 * r, 1.3 * self._half(base, across) * ("angle" in held))
+        d, across, wide = np.array([x, y]), np.array([-y, x]), 1.2 * r
+        if "angle" in held:  # as wide as the drawn section, unless it is along a body
+            off = self.points - base
+            far = np.abs(off[np.abs(off @ [y, x]) < 0.002 * self.size] @ across)
+            half = float(np.max(far[far < 0.2 * self.size], initial=0.0))
+            wide = max(wide, 1.3 * half * (half < 0.15 * self.size))
         if "angle" not in held:
             base = base + 1.5 * r * d
             self._line([at[0], base + 0.8 * r * across, base - 0.8 * r * across, at[0]], s.kind)
@@ -484,17 +475,6 @@ class Sketch:
         for k in np.linspace(-wide, wide - 0.4 * r, max(6, round(2 * wide / r))):
             at = foot + k * across
             self._line([at, at + 0.45 * r * (d - across)], kind, HOLD, 0.8)
-
-    def _half(self, p, across):
-        """Half the drawn height of the section at a point."""
-        off = self.points - p
-        near = np.abs(off @ [-across[1], across[0]]) < 0.002 * self.size
-        far = np.abs(off[near] @ across)
-        half = float(np.max(far[far < 0.2 * self.size], initial=0.0))
-        return half if half < 0.15 * self.size else 0.0  # along a body
-
-    def _joint(self, s, at, largest):
-        self._mark("o" if s.text == "hinge" else "s", at[0], s.kind)
 
     def _slider(self, s, at, largest):
         d, r = np.array(s.direction[0]), SIZE * self.size
@@ -528,21 +508,6 @@ class Sketch:
         angle = np.linspace(0, 4 * np.pi, 60)
         spiral = SIZE * self.size * angle / angle[-1] * [np.cos(angle), np.sin(angle)]
         self._line(at[0] + spiral.T, s.kind)
-        self._beside(s.text, at[0], HOLD, s.kind)
-
-    def _mass(self, s, at, largest):
-        self._mark("o", at[0], s.kind, INK)
-        self._beside(f"{s.text}{s.value:.6g}", at[0], INK, s.kind)
-
-    def _motor(self, s, at, largest):
-        self._moment(s._replace(text="angle(t)"), at, largest, HOLD)
-
-    def _drag(self, s, at, largest):
-        self._beside(s.text, at[0], HOLD, s.kind)
-
-    def _control(self, s, at, largest):
-        self._mark("D", at[0], s.kind)
-        self._beside(s.text, at[0], HOLD, s.kind)
 
     # artists
 
