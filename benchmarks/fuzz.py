@@ -25,6 +25,7 @@ from scipy.linalg import null_space
 from skfem import Basis, asm
 
 from skfem_ancf import AncfError, forms
+from skfem_ancf.actions.contact.contacts import SEEN
 from skfem_ancf.elements import ELEMENTS
 
 FORMULATIONS = ("assumed", "continuum", "ecm", "strain-split")
@@ -198,11 +199,16 @@ def draw_leaves(dice):
                   f"0.1, name='b{k}', compiled=COMPILED)"]
     lines.append(f"scene = Scene({', '.join(f'beam{k}' for k in range(n))})")
     lines += [f"scene.clamp('left', beam=beam{k}, thickness='free')" for k in range(n)]
-    lines.append(f"scene.contact('all', friction={dice.choice((0.0, 0.0, 0.3))})")
+    lines.append(f"scene.contact('all', friction={dice.choice((0.0, 0.0, 0.1, 0.3, 0.8))})")
     P = float(f"{dice.number(0.02, 1.0) * E * 0.1 * min(heights) ** 3 / 4:.3g}")
     lines.append(dice.choice((f"scene.point_force((0.0, {-P}), at='right', beam=beam0)",
                               f"scene.line_load((0.0, {-2 * P}), beam=beam0)")))
-    return "\n".join([*lines, "options = {}", ""])
+    options = {}
+    if dice.integer(0, 1):  # bent to and fro, so that leaves slide and go back
+        path = f"lambda t: np.interp(t, [0, 1, 2], [0, 1, {dice.number(-0.5, 1)}])"
+        lines[-1] = f"{lines[-1][:-1]}, amplitude={path})"
+        options = {"increments": dice.integer(1, 5), "min_step": 0.02}
+    return "\n".join([*lines, f"options = {options}", ""])
 
 
 def draw_pressed(dice):
@@ -605,18 +611,15 @@ def check_contact(system, state, internal):
                                                      state._equations.forces.changing)
     if np.any(both.pressure < 0.0) or np.max(np.abs(both.total)) > 1e-9 * size:
         raise Wrong("bodies pull each other, or actio is not reactio")
-    faces, most = [], max(np.max(beam.mesh.lengths) for beam in system.beams)
+    faces, most = faces_of(state), max(np.max(beam.mesh.lengths) for beam in system.beams)
     for k, (beam, s) in enumerate(zip(system.beams, system.slices)):
         force = (state.internal_force[s] - internal[s]).reshape(-1, beam.nd // 2, 2)[:, 0]
-        if np.max(np.abs(force.sum(axis=0) + state.contact(on=k).total)) > 1e-6 * size:
+        if np.max(np.abs(force.sum(axis=0) + state.contact(on=k).total)) > (
+                1e-6 * size + 1e-12 * np.abs(internal).max()):
             raise Wrong(f"the nodal forces of contact on beam {k} are not those of its points")
-        x = np.linspace(0.0, beam.mesh.lengths.sum(), 2000)
-        h, y = 0.5 * beam.mesh.height, beam.mesh.p[1, 0]
-        faces.append(np.hstack([state.position(np.array([x, 0 * x + y + side * h]), k)
-                                for side in (-1, 1)]))
     for k in range(len(faces)):
         on = state.contact(on=k)
-        others = np.hstack([one for j, one in enumerate(faces) if j != k])
+        others = np.hstack(np.delete(faces, k, axis=0).reshape(-1, 2, 4000))
         for x, gap in zip(on.points.T, on.gap):
             least = np.min(np.hypot(*(others - x[:, None])))
             # faces go on by a hundredth of an element beyond their ends
@@ -625,6 +628,47 @@ def check_contact(system, state, internal):
         normal = on.pressure.max() if len(on) else 0.0
         if friction == 0.0 and normal and np.any(on.sticking):
             raise Wrong("points stick without friction")
+    (_, found), = state._equations.forces.looks(state.u, 1.0)
+    check_cone(found, faces, friction)
+
+
+def faces_of(state):
+    """Points of both faces of straight beams, (k, 2, 2, 2000)."""
+    out = []
+    for k, beam in enumerate(state.system.beams):
+        x = np.linspace(0.0, beam.mesh.lengths.sum(), 2000)
+        h, y = 0.5 * beam.mesh.height, beam.mesh.p[1, 0]
+        out.append(np.stack([state.position(np.array([x, 0 * x + y + side * h]), k)
+                             for side in (-1, 1)], axis=1))
+    return np.array(out)
+
+
+def check_cone(found, faces, friction):
+    """Forces between members against the cone of friction, about faces (k, 2, 2, m)."""
+    _, touched, force, _, _, sticks, _, other = found
+    N, T, seen = normal_and_tangential(force, touched, faces[other])
+    most, tiny = friction * N, 1e-5 * N + 1e-8 * np.abs(force).max()
+    if np.any((N < 0.0)[seen]) or np.any((np.abs(T) > most + tiny)[seen]):
+        raise Wrong("a force between members is outside the cone of friction")
+    if np.any((np.abs(T) < most * (1.0 - SEEN) - tiny)[seen & ~sticks]):
+        raise Wrong("a point slips on a member, and friction is not at its limit")
+
+
+def normal_and_tangential(force, touched, faces):
+    """Parts of forces (2, n) along the outward normal and the tangent of what they touch, at points
+    (2, n) on one of its two faces (n, 2, 2, m), and whether these are not at an end."""
+    N, T, seen = np.zeros(len(touched.T)), np.zeros(len(touched.T)), np.zeros(len(touched.T), bool)
+    for k, (F, y, both) in enumerate(zip(force.T, touched.T, faces)):
+        distance = np.hypot(*(both - y[:, None, None]))
+        face, i = np.unravel_index(np.argmin(distance), distance.shape)
+        seen[k] = 20 <= i < distance.shape[1] - 20
+        if seen[k]:
+            slope = np.gradient(both[:, face, i - 3:i + 4], axis=1)[:, 2:5]
+            s = slope[:, 1] @ (y - both[:, face, i]) / (slope[:, 1] @ slope[:, 1])
+            way = slope[:, 1] + 0.5 * s * (slope[:, 2] - slope[:, 0])
+            way = way / np.hypot(*way)
+            N[k], T[k] = (2 * face - 1) * (way[0] * F[1] - way[1] * F[0]), way @ F
+    return N, T, seen
 
 
 def check_pressed(system, state, before, internal):

@@ -80,6 +80,32 @@ def test_leaves_that_touch_are_checked():
         fuzz.check(scene, state.replace(u=state.u * (1 + 1e-3)))
 
 
+SLIDING = """mesh0 = MeshBeam.init_line(np.linspace(0, 1.0, 9), 0.02)
+mesh1 = MeshBeam.init_line(np.linspace(0, 1.1, 9), 0.02, origin=(0.0, -0.02))
+beam0, beam1 = (Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e6, 0.3, 1), 0.1, name=name,
+                     compiled=COMPILED) for mesh, name in ((mesh0, "b0"), (mesh1, "b1")))
+scene = Scene(beam0, beam1)
+for beam in (beam0, beam1):
+    scene.clamp("left", beam=beam, thickness="free")
+scene.contact("all", friction=0.3)
+scene.line_load((0.0, -0.05), beam=beam0, amplitude=lambda t: np.interp(t, [0, 1, 2], [0, 1, 0.6]))
+options = {"increments": 3}
+"""
+
+
+def test_friction_of_members_is_checked():
+    """It is at its limit where leaves slide: a hundredth more or less is seen."""
+    assert fuzz.run(SLIDING) == ("in contact", "")
+    _, (state, _), _ = fuzz.solve(SLIDING, False)
+    (_, found), = state._equations.forces.looks(state.u, 1.0)
+    assert 0 < np.sum(found[5]) < 0.2 * len(found[5])
+    faces = fuzz.faces_of(state)
+    fuzz.check_cone(found, faces, 0.3)
+    for friction, words in ((0.297, "cone"), (0.303, "not at its limit")):
+        with pytest.raises(fuzz.Wrong, match=words):
+            fuzz.check_cone(found, faces, friction)
+
+
 def test_points_that_yield_are_checked():
     """On their way back: what is not on the yield surface is seen, and hardening that is wrong."""
     for beam, plane, y in (("ElementBeamCable(3)", "stress", 1e4), (
