@@ -53,7 +53,7 @@ def test_force_stiffness_and_potential_agree(element, friction):
     change = (contact.force(x + s * d, 0 * x, 0.0) - contact.force(x - s * d, 0 * x, 0.0)) / (2 * s)
     slope = (contact.stiffness(x, 0 * x, 0.0) @ d.ravel()).reshape(x.shape)
     size = np.abs(change).max()
-    assert_allclose(slope, change, rtol=0, atol=(1e-4 if friction else 3e-9) * size)
+    assert_allclose(slope, change, rtol=0, atol=(2e-5 if friction else 3e-9) * size)
     if not friction:
         work = np.sum(contact.force(x, 0 * x, 0.0) * d)
         gain = contact.potential_at(x + s * d, 0.0) - contact.potential_at(x - s * d, 0.0)

@@ -217,7 +217,10 @@ def type_of(hint: Any) -> Any:
     """Numba's type of an annotation: a number, an array such as ``F1``, or a named tuple."""
     kind = getattr(hint, "__metadata__", [hint])[0]
     if kind == MADE:
-        return types.NamedTuple([type_of(x) for x in hints(hint.__origin__)], hint.__origin__)
+        of = [type_of(x) for x in hints(hint.__origin__)]
+        if len(set(of)) == 1:  # as Numba infers it
+            return types.NamedUniTuple(of[0], len(of), hint.__origin__)
+        return types.NamedTuple(of, hint.__origin__)
     if isinstance(kind, str):
         return types.Array(_DTYPES[kind[0]], int(kind[1]), "C")
     if kind in SCALARS:

@@ -13,10 +13,11 @@ from ..core import F1, F3, is_builtin
 from ..core.jit import address, caller, compiled, reader
 from ..core.words import Words
 from ..actions.contact.pairs import Candidates, PairTables
+from ..actions.contact.tables import Pair
 from .tables import Equations
 
 _read, _call_law = reader(CompiledTables), caller(F1, F3, F3)
-_read_pair, _read_found = reader(PairTables), reader(Candidates)
+_read_pairs, _read_pair, _read_found = map(reader, (PairTables, Pair, Candidates))
 
 
 def tables_of(body, k):
@@ -24,6 +25,10 @@ def tables_of(body, k):
 
 
 def pair_tables(tables, k):
+    return _read_pairs(tables.pairs[k])
+
+
+def pair_of(tables, k):
     return _read_pair(tables.pairs[k])
 
 
@@ -95,11 +100,14 @@ def flat_after(flat: tuple[Equations, Words, list[Words]], plain: Equations
 
 
 def _flat_forces(forces, words):
-    if not forces.paired:
-        return forces
-    found = list(map(Words, forces.pairs))
-    words += found
-    return forces._replace(pairs=np.array([x.address for x in found], dtype=np.int64))
+    def flat(tables):
+        found = list(map(Words, tables.pairs))
+        words.extend(found)
+        return tables._replace(pairs=np.array([x.address for x in found], dtype=np.int64))
+
+    if forces.contacts.number:
+        forces = forces._replace(contacts=flat(forces.contacts))
+    return flat(forces) if forces.paired else forces
 
 
 def _flat_body(body, words):

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..actions.contact.contacts import YIELDS
-from ..actions.contact.tables import STIFFNESS
 from ..actions.joints.weld import PrescribedDisplacement
 from ..beam import Beam, kinematics
 from ..beam.distribution import SNAP
@@ -154,7 +153,7 @@ def _yields(state):
     for k, share in enumerate(yields):
         if share > YIELDS:
             which, group = contacts.groups[k]
-            firm = (1.0 + contacts.firmness[k]) * group.numbers[STIFFNESS]
+            firm = (1.0 + contacts.firmness[k]) * group.law.stiffness
             yield (f"{contacts.obstacles[which]!r} of default stiffness yields under the end "
                    f"of a beam or a stout body: some {100.0 * share:.2g} % of its force or of "
                    "the displacement. solve_static and scene.run stiffen it; for motions and "

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..actions.contact.contacts import FIRMER, YIELDS, Contacts
-from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
+from ..actions.contact.tables import ANCHORED, BILATERAL, hardening
 from ..actions.forces.springs import Turns
 from ..core import Array
 from ..core.band import NO_FACTORS, fix
@@ -336,9 +336,9 @@ def bound(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
     try:
         memory[ANCHORED], memory[BILATERAL] = 0.0, 1.0
         for k, ((_, group), flag) in enumerate(zip(contacts.groups, flags)):
-            pair = contacts.pair(k)
+            pair = contacts.tables.pairs[k]
             far = FAR * group.height * hardening(pair)
-            pair.memory[MULTIPLIER], memory[LARGEST + k] = far * flag, far
+            pair.multipliers[:], pair.largest[0] = far * flag, far
         yield
     finally:
         memory[:] = before

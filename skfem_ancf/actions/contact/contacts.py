@@ -13,16 +13,15 @@ import numpy as np
 from ...core.band import Band
 from ...core.callbacks import handle_of
 from ...core import Array, InputError, refuse, shown
-from .active_set import BEYOND, project
 from .crossing import CrossingGuard, middle_of
-from .gap import TINY, placed
-from .kernels import damp, of_contacts, of_pair, respond, touch_of, untouched
-from .laws import mean_pressure, pressure_slope
+from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set_rates, touch_of,
+                      untouched)
+from .laws import mean_pressure, potential, pressure_slope
+from .points import add_resistance
 from .poses import carried, taken_back
-from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, HEADER, LARGEST, NOW,
-                     NUMBERS, POSE, POSES, PRESSURES, RADIUS, RATE, SETTLE, STIFFNESS, TANGENT,
-                     TOLERANCE, TURNS, ContactTables, Pair, Request, SEEN as SEEN_AT, clear_table,
-                     pair_of, set_clear, transition, weights_of_motion)
+from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, FORCE, HEAD, NOW, POSE, POSES, PRESSURES,
+                     RATE, SETTLE, TANGENT, TINY, TURNS, ContactTables, Law, Pair, Request,
+                     SEEN as SEEN_AT, clear_table, set_clear, transition, weights_of_motion)
 
 
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
@@ -49,8 +48,8 @@ SOFTENED = 1e-2
 BY_POINTS = ("its steps do not update multipliers: a stopped body would rebound up to 3, 4.1 or "
              "5.6 times as fast with 1, 2 or 3 Gauss points, 4.3 times with Radau points")
 #: For scenes without obstacles.
-NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(LARGEST),
-                            0, 0, 0, np.zeros(0))
+NO_CONTACTS: Any = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(HEAD), 0, 0, 0,
+                                 np.zeros(0))
 
 
 class Group(NamedTuple):
@@ -59,9 +58,8 @@ class Group(NamedTuple):
     ``first`` is the first DOF of the element of each point, (n,); ``weights`` and ``slopes`` are
     the weights of pairs of DOFs in its position and in the slope of the axis, (pairs, n), none with
     sections; ``areas`` and ``offsets`` from the axis (n,); ``starts`` reference position and slope,
-    (4, n). Steps may cut the obstacle by ``depth``; ``height`` is that of the beam; ``numbers`` are
-    those of :mod:`skfem_ancf.actions.contact.tables`, (9,); ``firmest`` is the largest factor of
-    hardening.
+    (4, n). Steps may cut the obstacle by ``depth``; ``height`` is that of the beam; ``firmest`` is
+    the largest factor of hardening.
     """
 
     first: Any
@@ -74,7 +72,7 @@ class Group(NamedTuple):
     points: int
     depth: float
     height: float
-    numbers: Any
+    law: Law
     firmest: float
 
 
@@ -99,36 +97,48 @@ class Contacts:
         self.custom = any(one.shape.kind == CUSTOM for one in self.obstacles)
         self.anchored = any(one.friction > 0.0 for one in self.obstacles)
         self.augmented = any(one.method == "augmented" for one in self.obstacles)
-        tables = self._tables(N) if groups else NO_CONTACTS
-        if springs:
-            tables = tables._replace(memory=np.zeros(tables.memory.size + springs),
-                                     lasting=tables.lasting | TURNS)
-        self.tables, self._springs, self.keeps = tables, springs, bool(groups or springs)
+        self.softness, self.tables = np.ones(1), NO_CONTACTS
+        self._springs, self.keeps = springs, bool(groups or springs)
+        memory = np.zeros(HEAD + springs + sum(2 + 4 * len(group.first) for _, group in groups))
+        if groups:
+            poses, varies = np.zeros(POSES * len(self.obstacles)), int(self.moving or self.custom)
+            handle = handle_of(self)
+            pairs: Any = tuple(self._pair(*one, poses, varies, handle) for one in self.groups)
+            self.tables = ContactTables(
+                len(groups), pairs, poses, memory, varies, handle,
+                ANCHORS * self.anchored + PRESSURES * self.augmented,
+                np.zeros(0) if varies or self.augmented else self._clear(N))
+        if self.keeps:
+            self.tables = self._tables_after(memory)._replace(
+                lasting=self.tables.lasting | TURNS * (springs > 0))
         self._answers: Any = None
         self.put(0.0, 0.0, self.tables.poses)
         if self.tables.clear.size:
             u = np.zeros(N)
             set_clear(self.tables.clear, u, min(gap.min() for _, _, gap in self.look(u, 0.0)))
 
-    def _tables(self, N):
-        n = len(self.groups)
-        headers, ints, floats = np.zeros((n, HEADER), dtype=np.int64), [], []
-        memory, at, after = LARGEST + 2 * n, 0, HEADER * n
-        for number, (k, group) in enumerate(self.groups):
-            shape, points, pairs = self.numbers(k), len(group.first), len(group.weights)
-            headers[number] = (self.obstacles[k].shape.kind, k, group.elements, group.points, pairs,
-                               len(group.slopes) > 0, len(shape), after, at, memory)
-            ints.append(group.first)
-            floats.append(np.concatenate([x.ravel() for x in (
-                group.weights, group.slopes, group.areas, group.offsets, group.starts,
-                middle_of(group), group.numbers, shape)]))
-            memory, after, at = memory + 4 * points, after + points, at + floats[-1].size
-        return ContactTables(
-            n, np.concatenate([headers.ravel(), *ints]).astype(np.int64), np.concatenate(floats),
-            np.zeros(POSES * len(self.obstacles)), np.zeros(memory),
-            int(self.moving or self.custom), handle_of(self),
-            ANCHORS * self.anchored + PRESSURES * self.augmented,
-            np.zeros(0) if self.moving or self.custom or self.augmented else self._clear(N))
+    def _pair(self, k, group, poses, varies, handle):
+        """The :class:`~skfem_ancf.actions.contact.tables.Pair` of a group, without history."""
+        pairs, none = np.arange(len(group.weights))[:, None], np.zeros(0)
+        return Pair(
+            k, self.obstacles[k].shape.kind, self.numbers(k), varies, handle,
+            poses[k * POSES:(k + 1) * POSES].reshape(3, POSE),
+            np.ascontiguousarray(group.first // 2 + pairs, dtype=np.int64),
+            *map(np.ascontiguousarray, (group.weights, group.slopes, group.areas, group.offsets,
+                                        group.starts, middle_of(group))),
+            group.law, self.softness, none, none, none, none, none + 0j, none)
+
+    def _tables_after(self, memory):
+        """The tables with other history data."""
+        at, pairs, n = HEAD + 2 * self.tables.number, list[Pair](), self.tables.number
+        for k, pair in enumerate(self.tables.pairs):
+            m, own = pair.areas.size, memory[at:at + 4 * pair.areas.size]
+            pairs.append(pair._replace(
+                common=memory[:HEAD], largest=memory[HEAD + k:HEAD + k + 1],
+                firmness=memory[HEAD + n + k:HEAD + n + k + 1], multipliers=own[:m],
+                anchors=own[m:3 * m].view(complex), slips=own[3 * m:]))
+            at += 4 * m
+        return self.tables._replace(memory=memory, pairs=tuple(pairs) or self.tables.pairs)
 
     def _clear(self, N):
         """The table of :func:`~skfem_ancf.actions.contact.tables.is_clear`."""
@@ -140,11 +150,7 @@ class Contacts:
             pairs = np.sqrt(2.0) * weights_of_motion(
                 a.T, group.first[:, None] // 2 + np.arange(len(a)), -(-N // 2))
             out = np.maximum(out, np.repeat(pairs, 2)[:N])
-        return clear_table(out, BEYOND * max(group.numbers[RADIUS] for _, group in self.groups))
-
-    def pair(self, k: int) -> Pair:
-        """Views of the tables of group k."""
-        return pair_of(self.tables, k)
+        return clear_table(out, BEYOND * max(group.law.radius for _, group in self.groups))
 
     def numbers(self, k: int) -> Array:
         """Parameters of the shape of obstacle k, relative to the origin."""
@@ -182,24 +188,20 @@ class Contacts:
     def without_friction(self, soft: bool = False) -> Iterator[None]:
         """Context in which nothing sticks, if ``soft`` with reduced stiffness too."""
         # Iterations converge there more easily, to a nearby state.
-        memory, numbers = self.tables.memory, [
-            self.pair(k).numbers for k in range(len(self.groups))]
-        before, sticks = [x[STIFFNESS] for x in numbers], memory[ANCHORED]
+        memory = self.tables.memory
+        before = memory[ANCHORED], self.softness[0]
         try:
             memory[ANCHORED] = 0.0
-            for x in numbers:
-                x[STIFFNESS] *= SOFTENED if soft else 1.0
+            self.softness[0] *= SOFTENED if soft else 1.0
             yield
         finally:
-            memory[ANCHORED] = sticks
-            for x, k in zip(numbers, before):
-                x[STIFFNESS] = k
+            memory[ANCHORED], self.softness[0] = before
 
     def after(self, memory: Array) -> Contacts:
         """A copy with other history data (n,)."""
         _ = self.sweep if self.obstacles else None  # one, whatever the history
         other = copy(self)
-        other.tables = self.tables._replace(memory=memory, clear=self.tables.clear.copy())
+        other.tables = self._tables_after(memory)._replace(clear=self.tables.clear.copy())
         other._answers = self  # as handle
         return other
 
@@ -220,21 +222,22 @@ class Contacts:
     @property
     def firmness(self) -> Array:
         """Factors of hardening relative to the default stiffness, (groups,), a view; 0 for none."""
-        first = LARGEST + len(self.groups)
+        first = HEAD + len(self.groups)
         return self.tables.memory[first:first + len(self.groups)]
 
     @property
     def with_multipliers(self) -> Array:
         """Whether a group uses the augmented Lagrangian, (groups,)."""
-        return np.array([group.numbers[TOLERANCE] > 0.0 for _, group in self.groups])
+        return np.array([group.law.tolerance > 0.0 for _, group in self.groups])
 
     def set_hardening(self, firmness: Array, u: Array, t: float) -> None:
         """Set factors of hardening; the tractions of sticking points at u do not change."""
         for k, ((which, _), x, _) in enumerate(self.look(u, t)):
-            part, memory = (1.0 + self.firmness[k]) / (1.0 + firmness[k]), self.pair(k).memory
+            part, pair = (1.0 + self.firmness[k]) / (1.0 + firmness[k]), self.tables.pairs[k]
             points = taken_back(self.pose(which, t, False), x)
-            memory[1:3] = points + part * (memory[1:3] - points)
-            memory[3] *= part
+            points = points[0] + 1j * points[1]
+            pair.anchors[:] = points + part * (pair.anchors - points)
+            pair.slips[:] *= part
         self.firmness[:] = firmness
 
     def stiffened(self, k: int, u: Array, t: float) -> tuple[Array, Array, Array]:
@@ -242,9 +245,9 @@ class Contacts:
         # Those of the force on the degrees of freedom (N,); then by point the derivative, and the
         # force, times the penetration, (n,).
         (_, group), _, gap = self.look(u, t)[k]
-        memory, pair, firm = self.tables.memory, self.pair(k), 1.0 + self.firmness[k]
+        memory, pair, firm = self.tables.memory, self.tables.pairs[k], 1.0 + self.firmness[k]
         width, a = transition(pair), np.maximum(-gap, 0.0)
-        push = firm * group.numbers[STIFFNESS] * group.areas * a
+        push = firm * group.law.stiffness * group.areas * a
         out, sticks = np.zeros((2, len(u))), memory[ANCHORED]
         try:
             memory[ANCHORED] = 0.0
@@ -366,7 +369,7 @@ class Contacts:
         self._place(t)
         out = []
         for k, group in enumerate(self.groups):
-            pair, at = self.pair(k), np.arange(len(group[1].first))
+            pair, at = self.tables.pairs[k], np.arange(len(group[1].first))
             found = project(pair, NOW, u, at)
             out.append((group, np.array([found.surface.real, found.surface.imag]), found.gap))
         return out
@@ -378,17 +381,17 @@ class Contacts:
         self._place(t)
         out = []
         for k, (which, group) in enumerate(self.groups):
-            pair, at = self.pair(k), np.arange(len(group.first))
-            found, K, rest = project(pair, NOW, u, at), np.empty((4, at.size)), np.empty(at.size)
-            force, damping, pressure = 0j * found.x, 0j * found.x, np.empty(at.size)
-            touch = touch_of(pair, True, found, found, at)
-            respond(pair, True, touch, force, rest, K, pressure)
-            if v is not None and group.numbers[DAMPING] > 0.0:
-                moved, turns = placed(pair, v, 0.0, at)
-                damp(pair, 0.0, touch, moved, turns, damping, K)
-            force += damping
-            out.append((which, touch.place + self.origin[:, None], -np.array(
-                [force.real, force.imag]), pressure / group.areas, found.gap))
+            pair, at = self.tables.pairs[k], np.arange(len(group.first))
+            found, R, K = project(pair, NOW, u, at), np.zeros((4, at.size)), np.zeros((16, at.size))
+            touch, spot = touch_of(pair, True, found, found, at)
+            r = response(pair, True, touch)
+            if v is not None and group.law.damping > 0.0:
+                rates = np.empty((4, at.size))
+                set_rates(pair, v, at, rates)
+                damp(pair, 0.0, touch, spot, rates, R, K)
+            add_resistance(touch, r, R)
+            out.append((which, spot.place + self.origin[:, None], -R[:2],
+                        r.pressure / group.areas, found.gap))
         return out
 
     def slipping(self, u: Array, t: float) -> list[Any]:
@@ -411,9 +414,9 @@ class Contacts:
                 () if self.untouched(u) else self.look(u, t)):
             if self.obstacles[which].method == "augmented":
                 continue
-            firmness, width = self.firmness[k], transition(self.pair(k))
-            S = (np.maximum(-gap, 0.0) ** 3 - np.maximum(-gap - width, 0.0) ** 3) / (6.0 * width)
-            total += (1.0 + firmness) * group.numbers[STIFFNESS] * float(group.areas @ S)
+            firmness, width = self.firmness[k], transition(self.tables.pairs[k])
+            total += (1.0 + firmness) * group.law.stiffness * float(
+                group.areas @ potential(-gap, width))
         return total
 
     def entries(self, t: float, u: Array, bandwidth: int) -> tuple[Array, Array, Array]:
@@ -464,7 +467,7 @@ class Contacts:
         for firmness, ((which, group), _, gap) in zip(self.firmness, seen):
             one, deep, h = self.obstacles[which], -float(gap.min()), group.height
             if one.penalty is None and deep > SUNK * h:
-                k = (1.0 + firmness) * group.numbers[STIFFNESS]
+                k = (1.0 + firmness) * group.law.stiffness
                 firm = k * (deep + max(0.0, deep - h)) / (FIRM * h)  # both faces may be inside
                 out.append(
                     f"a body is {deep:.3g} deep in {one!r}, {deep / h:.2g} times its height: its "
@@ -511,9 +514,9 @@ def matched(ours: Iterable[Any], theirs: Iterable[Any],
 def take_over(ours: Contacts, theirs: Contacts, u: Array, t: float) -> bool:
     """Give contacts the history of others, where there is one; else friction begins at u, t."""
     def known(contacts, k):
-        (which, _), pair = contacts.groups[k], contacts.pair(k)
+        which, group = contacts.groups[k]
         shape = contacts.obstacles[which].shape
-        return (pair.first, pair.weights, pair.numbers[:NUMBERS], np.array(shape.kind),
+        return (group.first, group.weights, group.law, np.array(shape.kind),
                 shape.numbers_about(np.zeros(2)))
 
     found = [*matched(range(len(ours.groups)), range(len(theirs.groups)), lambda k, j: all(
@@ -521,10 +524,11 @@ def take_over(ours: Contacts, theirs: Contacts, u: Array, t: float) -> bool:
     if found:
         new, old = ours.tables.memory, theirs.tables.memory
         ours.begin(u, t, len(found) < len(ours.groups))
-        new[:LARGEST] = old[:LARGEST]
+        new[:HEAD] = old[:HEAD]
         new[ANCHORED] = ours.anchored
     for k, j in found:
-        new[LARGEST + k], ours.firmness[k] = old[LARGEST + j], theirs.firmness[j]
-        ours.pair(k).memory[:] = theirs.pair(j).memory
-        ours.pair(k).memory[1:3] += (theirs.origin - ours.origin)[:, None]
+        a, b = ours.tables.pairs[k], theirs.tables.pairs[j]
+        for x, y in zip(a[-5:], b[-5:]):  # largest multiplier, firmness, and those of points
+            x[:] = y
+        a.anchors[:] += complex(*(theirs.origin - ours.origin))
     return bool(found)

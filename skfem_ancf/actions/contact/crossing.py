@@ -12,7 +12,7 @@ import numpy as np
 from ...core import Array
 from .gap import outline
 from .poses import taken_back
-from .tables import CUSTOM, STIFFNESS
+from .tables import CUSTOM
 
 #: Largest number of samples of a path; number of points per batch.
 MOST_PARTS, TOGETHER = 400, 50_000
@@ -52,7 +52,7 @@ class CrossingGuard:
             if path.deepest > DEEP * inner:
                 return (f"a body was {path.deepest:.3g} deep in {path.obstacle!r}, whose middle is "
                         f"{inner:.3g} deep: it may leave it on the other side. Give stiffness= of "
-                        f"more than {path.obstacle.groups[0].numbers[STIFFNESS]:.3g}")
+                        f"more than {path.obstacle.groups[0].law.stiffness:.3g}")
         return ""
 
     def begin(self) -> None:

@@ -9,11 +9,10 @@ import numpy as np
 
 from ...core.callbacks import custom_distance
 from ...core import C1, F1, F2, apart, indices, source
-from .plane import dot, scaled, turned, vector
-from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, PAIR, PAIRS, RADIUS, SIDE, START, TINY
+from .plane import dot, scaled, size, turned, vector
+from .points import SHORT
+from .tables import CUSTOM, PAIR, TINY
 
-#: The least square of a slope: sections have none, and levers of no length.
-SHORT = 1e-30
 #: Number of parameters of a circle.
 DISC = 5
 
@@ -31,17 +30,17 @@ class Placed(NamedTuple):
 def placed(pair, u, factor, at):
     """Positions and slopes of points: factor times the reference ones plus displacements."""
     n, z = at.size, u.view(np.complex128)
-    x, t, start = np.empty(n, np.complex128), np.empty(n, np.complex128), pair.points[START:]
+    x, t, start = np.empty(n, np.complex128), np.empty(n, np.complex128), pair.starts
     for i in indices(n):
         m = at[i]
         x[i] = scaled(factor, vector(start[0, m], start[1, m]))
         t[i] = scaled(factor, vector(start[2, m], start[3, m]))
     for k in range(pair.weights.shape[0]):
         for i in indices(n):
-            x[i] += scaled(pair.weights[k, at[i]], z[pair.first[at[i]] // 2 + k])
+            x[i] += scaled(pair.weights[k, at[i]], z[pair.dofs[k, at[i]]])
     for k in range(pair.slopes.shape[0]):
         for i in indices(n):
-            t[i] += scaled(pair.slopes[k, at[i]], z[pair.first[at[i]] // 2 + k])
+            t[i] += scaled(pair.slopes[k, at[i]], z[pair.dofs[k, at[i]]])
     return x, t
 
 
@@ -49,20 +48,20 @@ def placed(pair, u, factor, at):
 def middles(pair, u, factor, x, radius):
     """Positions of element middles (2, n), and bounds of the distance of their points."""
     # Reference positions are multiplied by ``factor``.
-    n, half, largest = x.shape[1], pair.header[PAIRS] // 2, pair.numbers[RADIUS]
-    m = pair.first.size // n
-    first, p, q = pair.first[::m], pair.middles[0], pair.middles[1]
+    n, pairs, z = x.shape[1], pair.dofs.shape[0], u.view(np.complex128)
+    m = pair.areas.size // n
+    first, p, q = pair.dofs[0, ::m], pair.middles[0], pair.middles[1]
     for e in indices(n):
-        x[0, e], x[1, e], radius[e] = factor * p[e], factor * q[e], largest
-    for k in range(pair.header[PAIRS]):
-        p, q, same = pair.middles[2 + 2 * k], pair.middles[3 + 2 * k], 1.0 * (k == half)
+        x[0, e], x[1, e], radius[e] = factor * p[e], factor * q[e], pair.law.radius
+    for k in range(pairs):
+        p, q, same = pair.middles[2 + 2 * k], pair.middles[3 + 2 * k], 1.0 * (k == pairs // 2)
+        dofs = pair.dofs[k, ::m]
         for e in indices(n):
-            a, b = u[first[e] + 2 * k], u[first[e] + (2 * k + 1)]
-            x[0, e] += p[e] * a
-            x[1, e] += p[e] * b
+            a = z[dofs[e]]
+            x[0, e] += p[e] * a.real
+            x[1, e] += p[e] * a.imag
             # both places of an element together are a translation
-            c, d = a - same * u[first[e]], b - same * u[first[e] + 1]
-            radius[e] += q[e] * np.sqrt(c * c + d * d)
+            radius[e] += q[e] * size(a - scaled(same, z[first[e]]))
 
 
 @source
@@ -83,16 +82,16 @@ def carried(q, p, x):
 @apart("contacts", PAIR, int, bool, F2, F2)
 def distances(pair, which, whole, x, out):
     """Gap, its gradient and, if ``whole``, second derivatives xx, xy, yy at points x, (6, n)."""
-    pose, y, side = pair.poses[which], np.empty(x.shape), pair.numbers[SIDE]
+    pose, y, side = pair.poses[which], np.empty(x.shape), pair.law.side
     cos, sin = pose[2], pose[3]
     for i in indices(x.shape[1]):
         p, q = x[0, i] - pose[0], x[1, i] - pose[1]
         a, b = p - pose[4], q - pose[5]
         y[0, i], y[1, i] = p + (cos - 1.0) * a + sin * b, q + (cos - 1.0) * b - sin * a
-    if pair.header[KIND] == CUSTOM:
-        custom_distance(pair.custom, pair.header[OBSTACLE], pose[9], y, out)
+    if pair.kind == CUSTOM:
+        custom_distance(pair.custom, pair.obstacle, pose[9], y, out)
     else:
-        outline(pair.numbers[NUMBERS:], whole, y, out)
+        outline(pair.shape, whole, y, out)
     for i in indices(x.shape[1]):
         out[0, i] *= side
     if not whole:

@@ -1,12 +1,12 @@
-"""Kernels of contact: forces, tangents, friction, multipliers.
+"""Contact of beams with obstacles: what may touch, and the points of
+:mod:`skfem_ancf.actions.contact.points` for it.
 
-Each active point has a force on its position and slope, (4,), with the derivative (4, 4),
-distributed to the degrees of freedom by the weights of the point. Energy-conserving schemes take
-means between two states whose work is the change of the potential: the discrete gradient of the
-gap (Gonzalez 1996) times the slope of S between the states. The spring of friction is that of the
-end, which damps its vibrations.
+A broad search by elements compares the gap of the middle of each with the radius of its points. Of
+points in contact the gap in the middle of a step has a normal, whose correction by a multiple of
+the displacement is a discrete gradient (Gonzalez 1996). The spring of friction is that of the end,
+which damps its vibrations.
 
-In a motion the stiffness is at least ``INERTIA`` times the mass over the squared step, so that few
+In a motion the stiffness is at least ``inertia`` times the mass over the squared step, so that few
 updates of multipliers are needed.
 """
 
@@ -17,17 +17,17 @@ import numpy as np
 from ...core.band import smallest
 from ...core import C1, F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
-from .active_set import near_points, project, relative_travel, search, selected, touching
-from .gap import SHORT, TINY, carried, distances, outside, placed
-from .laws import (damping_loss, from_anchor, mean_pressure, mean_pressure_slope, pressure_slope,
-                   return_mapping)
+from .gap import Placed, carried, distances, middles, outside, placed
+from .laws import mean_pressure, pressure_slope, return_mapping
 from .plane import cross, dot, scaled, turned, vector
-from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, ANCHORS, AREA, AUGMENT, BEGIN, BILATERAL,
-                     DAMPED_TANGENT, DAMPING, END, FOLLOWED, FORCE, FRICTION, LARGEST,
-                     MULTIPLIER, NOW, OFFSET, PAIR, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING,
-                     STIFFNESS, TOLERANCE, ContactTables, Request, hardening, is_clear, pair_of,
-                     set_clear, transition)
+from .points import (RESPONSE, TOUCH, Touch, add_bend, add_coupling, add_resistance, by_slope,
+                     product, put, respond, spread)
+from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, DAMPED_TANGENT, END,
+                     FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SETTLE, TINY, ContactTables,
+                     Request, hardening, is_clear, pair_of, set_clear, transition)
 
+#: Largest distance at which anchors follow points in a motion, in radii of an element.
+BEYOND = 4.0
 #: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
 #: The gap where nothing is.
@@ -37,22 +37,19 @@ FAR = 1e300
 INSIDE, NOWHERE = 1e-9, 1e-14
 
 
-class Touch(NamedTuple):
-    """Points in contact between two states, (n,); plane vectors are complex numbers."""
+class Spot(NamedTuple):
+    """What points in contact with an obstacle have beside their :class:`Touch`, (n,)."""
 
-    at: I1
-    slope: C1  # of the axis, in the middle
-    moved: C1  # displacement of the place on it, and change of the slope
-    turns: C1
-    before: F1  # penetrations
-    after: F1
-    last: C1  # surface point at the end
-    place: F2  # and in the middle, (2, n)
-    normal: C1  # gradient of the gap there
+    slope: C1  # of the axis, in the middle of a step
+    normal: C1  # gradient of the gap of the surface point there
     bend: F2  # and its second derivatives xx, xy, yy, (3, n)
+    place: F2  # that surface point, (2, n)
+    last: C1  # and the one at the end
+    away: C1  # from the anchor
+    slip: F1
 
 
-TOUCH: TypeAlias = Annotated[Touch, MADE]
+SPOT: TypeAlias = Annotated[Spot, MADE]
 
 
 @apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
@@ -82,15 +79,15 @@ def untouched(tables, what, u):
 @source
 def of_pair(pair, request, u, v, out, least):
     """Add the answer of the active points of a pair; of a FORCE set also the least gap."""
-    what, same = request.what, request.span == 0.0
-    if what == ALONG:
-        out[1] = max(out[1], relative_travel(pair, v))
+    what, same, law = request.what, request.span == 0.0, pair.law
+    if what == ALONG:  # the largest displacement of an element's middle
+        out[1] = max(out[1], _relative_travel(pair, v))
     resists = what == RESISTING or what == DAMPED_TANGENT
-    if resists and pair.numbers[DAMPING] == 0.0:
+    if resists and law.damping == 0.0:
         return
     begin = search(pair, NOW if same else BEGIN, u)
     end = begin if same else search(pair, END, v)
-    at = near_points(pair, what, begin, end)
+    at = _near_points(pair, what, begin, end)
     if what == FORCE:
         beyond = np.empty(end.size)
         for e in indices(end.size):
@@ -102,269 +99,294 @@ def of_pair(pair, request, u, v, out, least):
     b = a if same else project(pair, END, v, at)
     if what == FORCE:
         least[0] = min(least[0], smallest(b.gap))
-    if what < SETTLE:
-        some = touching(pair, a, b, at)
-        at = at[some]
-        a, b = selected(a, some), selected(b, some)
+    if what < SETTLE:  # those that touch at one of the states
+        part, flags = 1.0 / hardening(pair), np.empty(at.size)
+        for i in indices(at.size):
+            flags[i] = 1.0 * (np.minimum(a.gap[i], b.gap[i]) < part * pair.multipliers[at[i]])
+        some = np.nonzero(flags)[0]
+        at, a, b = at[some], _selected(a, some), _selected(b, some)
     if at.size == 0:
         return
-    p = touch_of(pair, same, a, b, at)
+    touch, spot = touch_of(pair, same, a, b, at)
     if what == AUGMENT:
-        _augment(pair, at, p.before, out)
-        return
-    force, missing, K, pressure = np.empty(at.size, np.complex128), np.zeros(at.size), np.empty(
-        (4, at.size)), np.empty(at.size)
-    moved, turns = p.moved, p.turns
-    if resists or what == ALONG:
-        moved, turns = placed(pair, v, 0.0, at)
-    if resists:
-        damp(pair, request.factor, p, moved, turns, force, K)
-    else:
-        respond(pair, same, p, force, missing, K, pressure)
-    if what == SETTLE:
-        _settle(pair, same, p, pressure, out)
-    elif what == FORCE or what == RESISTING:
-        _add_force(pair, p, force, missing, out)
-    else:
-        S = np.zeros((16, at.size))
-        _stiffness(pair, p, force, K, S)
-        if what == ALONG:
-            _add_along(moved, turns, S, out)
+        _augment(pair, at, touch.before, out)
+    elif resists:
+        R, K, rates = np.zeros((4, at.size)), np.zeros((16, at.size)), np.empty((4, at.size))
+        set_rates(pair, v, at, rates)
+        damp(pair, request.factor, touch, spot, rates, R, K)
+        if what == RESISTING:
+            spread(pair.dofs, pair.weights, pair.slopes, at, R, out.view(np.complex128))
         else:
-            _add_stiffness(pair, request, at, S, out)
+            _add_stiffness(pair, request, at, K, out)
+    else:
+        _answer(pair, request, same, touch, spot, v, out)
+
+
+@apart("contacts", PAIR, Annotated[Request, MADE], bool, TOUCH, SPOT, F1, F1)
+def _answer(pair, request, same, touch, spot, v, out):
+    """Add the answer of points that press and rub."""
+    what, at, r = request.what, touch.at, response(pair, same, touch)
+    n = at.size
+    if what == SETTLE:
+        _settle(pair, same, touch, spot, r, out)
+    elif what == FORCE:
+        R = np.zeros((4, n))
+        add_resistance(touch, r, R)
+        spread(pair.dofs, pair.weights, pair.slopes, at, R, out.view(np.complex128))
+    else:
+        K = np.zeros((16, n))
+        _set_curvature(pair, same, touch, spot, r, K)
+        add_coupling(touch, r, K)
+        if what == ALONG:
+            rates, value = np.empty((4, n)), np.zeros(n)
+            set_rates(pair, v, at, rates)
+            for x in range(4):
+                for y in range(4):
+                    for i in indices(n):
+                        value[i] += K[4 * x + y, i] * rates[x, i] * rates[y, i]
+            add_each(out, 0 * at, value)
+        else:
+            _add_stiffness(pair, request, at, K, out)
+
+
+# what may touch
+
+
+@source
+def search(pair, which, u):
+    """Lower bound of the gap of each element, shape (elements,)."""
+    rows = np.empty((9, pair.middles.shape[1]))
+    x, gap, radius = rows[:2], rows[2], rows[8]
+    middles(pair, u, 1.0, x, radius)
+    distances(pair, which, False, x, rows[2:8])
+    for e in indices(gap.size):
+        gap[e] -= radius[e]
+    return gap
+
+
+@source
+def _near_points(pair, what, begin, end):
+    """Numbers of the points of elements that may touch, from the bounds at both ends."""
+    n, reach, law = begin.size, pair.largest[0], pair.law
+    if what == SETTLE and law.friction > 0.0:  # and points that may touch next
+        reach = BEYOND * law.radius if pair.common[RATE] > 0.0 else FAR
+    flags = np.empty(pair.areas.size)
+    m = flags.size // n
+    for p in range(m):
+        flag = flags[p::m]
+        for e in indices(n):
+            flag[e] = 1.0 * (np.minimum(begin[e], end[e]) <= reach)
+    return np.nonzero(flags)[0]
+
+
+@source
+def project(pair, which, u, at):
+    """The :class:`~skfem_ancf.actions.contact.gap.Placed` of points."""
+    x, t = placed(pair, u, 1.0, at)
+    n = at.size
+    surface, rows = np.empty(n, np.complex128), np.empty((8, n))
+    for i in indices(n):
+        surface[i] = outside(x[i], t[i], pair.offsets[at[i]])
+        rows[0, i], rows[1, i] = surface[i].real, surface[i].imag
+    distances(pair, which, False, rows[:2], rows[2:])
+    return Placed(x, t, surface, rows[2])
+
+
+@source
+def _selected(points, some):
+    """Some of the points."""
+    return Placed(points.x[some], points.t[some], points.surface[some], points.gap[some])
+
+
+@source
+def _relative_travel(pair, u):
+    """Largest displacement of an element's middle, relative to the radius of its points."""
+    n, way = pair.middles.shape[1], 0.0
+    rows = np.empty((3, n))
+    middles(pair, u, 0.0, rows[:2], rows[2])
+    for e in range(n):
+        way = max(way, rows[0, e] * rows[0, e] + rows[1, e] * rows[1, e])
+    return np.sqrt(way) / pair.law.radius
+
+
+# points in contact
 
 
 @source
 def touch_of(pair, same, a, b, at):
-    """The :class:`Touch` between two states of points, which may be one."""
-    n, part, poses = at.size, 1.0 / hardening(pair), pair.poses
-    moved, turns, slope, last = (np.empty(n, np.complex128), np.empty(n, np.complex128),
-                                 np.empty(n, np.complex128), np.empty(n, np.complex128))
-    before, after, x, found, normal = np.empty(n), np.empty(n), np.empty((2, n)), np.empty(
-        (6, n)), np.empty(n, np.complex128)
+    """Points between two states, which may be one: :class:`Touch` and :class:`Spot`."""
+    n, part, poses, law = at.size, 1.0 / hardening(pair), pair.poses, pair.law
+    slope, last, away, normal = (np.empty(n, np.complex128), np.empty(n, np.complex128), np.zeros(
+        n, np.complex128), np.empty(n, np.complex128))
+    before, after, held, k, place, found = np.empty(n), np.empty(n), np.empty(n), np.empty(
+        n), np.empty((2, n)), np.empty((6, n))
+    moved, gap, slips, slip, trial, spring, missing = np.empty((4, n)), np.empty((4, n)), np.empty(
+        (4, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.empty(n)
+    firm = pair.softness[0] * law.stiffness * hardening(pair)
     for i in indices(n):
-        x0, x1, end = a.x[i], b.x[i], b.surface[i]
+        x0, x1, end, m = a.x[i], b.x[i], b.surface[i], at[i]
         if not same and pair.moving > 0:  # with the obstacle to its middle pose
             x0 = x0 + carried(poses[NOW], poses[BEGIN], a.surface[i]) - a.surface[i]
             there = carried(poses[NOW], poses[END], end)
             x1, end = x1 + there - end, there
-        more = part * pair.memory[MULTIPLIER, at[i]]
+        more = part * pair.multipliers[m]
         before[i], after[i], last[i] = more - a.gap[i], more - b.gap[i], end
-        moved[i], turns[i], slope[i] = x1 - x0, b.t[i] - a.t[i], scaled(0.5, a.t[i] + b.t[i])
-        middle = outside(scaled(0.5, x0 + x1), slope[i], pair.points[OFFSET, at[i]])
-        x[0, i], x[1, i] = middle.real, middle.imag
-    distances(pair, NOW, True, x, found)
+        k[i], held[i] = firm * pair.areas[m], pair.common[BILATERAL] * more
+        put(moved, 0, i, x1 - x0)
+        put(moved, 1, i, b.t[i] - a.t[i])
+        slope[i] = scaled(0.5, a.t[i] + b.t[i])
+        middle = outside(scaled(0.5, x0 + x1), slope[i], pair.offsets[m])
+        place[0, i], place[1, i] = middle.real, middle.imag
+    distances(pair, NOW, True, place, found)
     for i in indices(n):
         normal[i] = vector(found[1, i], found[2, i])
-    return Touch(at, slope, moved, turns, before, after, last, x, normal, found[3:])
+        put(gap, 0, i, normal[i])
+        put(gap, 1, i, by_slope(slope[i], pair.offsets[at[i]], normal[i]))
+        put(slips, 0, i, turned(normal[i]))
+        put(slips, 1, i, by_slope(slope[i], pair.offsets[at[i]], turned(normal[i])))
+    if law.friction > 0.0:
+        # the extrapolation damps vibrations on the springs; a mean does so by itself
+        more, anchored = 1.0 if same and pair.common[RATE] > 0.0 else 0.0, np.minimum(
+            pair.common[ANCHORED], 1.0)
+        for i in indices(n):
+            m = at[i]
+            away[i] = _from_anchor(poses[NOW], last[i], pair.anchors[m])
+            slip[i] = cross(normal[i], away[i])
+            c = anchored * law.stiffness * (1.0 + pair.firmness[0]) * pair.areas[m]
+            trial[i] = c * (slip[i] + more * (slip[i] - pair.slips[m]))
+            spring[i] = c * (1.0 + more)
+    if not same:  # with the work of the change of the gap
+        product(gap, moved, missing)
+        close = (CLOSE * law.radius) ** 2
+        for i in indices(n):
+            square = moved[0, i] ** 2 + moved[1, i] ** 2 + moved[2, i] ** 2 + moved[3, i] ** 2
+            missing[i] = (missing[i] + after[i] - before[i]) * (square > close) / np.maximum(
+                square, TINY)
+        for x in range(4):
+            for i in indices(n):
+                gap[x, i] -= missing[i] * moved[x, i]
+    return (Touch(at, k, before, after, held, moved, gap, slips, trial, spring),
+            Spot(slope, normal, found[3:], place, last, away, slip))
 
 
 @source
-def lever(pair, p, i):
-    """u and a of the derivative ``-u (a . dt)`` of surface points by their slope t."""
-    t, c = p.slope[i], pair.points[OFFSET, p.at[i]]
-    short = 1.0 / np.sqrt(np.maximum(dot(t, t), SHORT))
-    unit = scaled(short, t)
-    return scaled(c * short, unit), turned(unit)
-
-
-# laws
-
-
-@apart("contacts", PAIR, bool, TOUCH, C1, F1, F2, F1)
-def respond(pair, same, p, force, missing, K, pressure):
-    """Set resisting forces of pressure and Coulomb friction, their derivatives, and pressures.
-
-    ``missing`` is the difference of the work of the pressure from the change of its potential, over
-    the squared displacement.
-    """
-    width, part, memory = transition(pair), hardening(pair), pair.memory
-    holds = pair.common[BILATERAL] / part
-    close, (friction, all_stick, sticking) = (CLOSE * pair.numbers[RADIUS]) ** 2, _tangential(pair)
-    # damps vibrations on the springs; a mean does so by itself
-    extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
-    for i in indices(pressure.size):
-        m, n = p.at[i], p.normal[i]
-        a, b, area = p.before[i], p.after[i], pair.points[AREA, m]
-        scale = pair.numbers[STIFFNESS] * part * area
-        mean = mean_pressure(a, b, width) - holds * memory[MULTIPLIER, m]
-        P, c = scale * mean, scale * mean_pressure_slope(a, b, width, mean)
-        u, across = lever(pair, p, i)
-        way = p.moved[i] - scaled(dot(across, p.turns[i]), u)
-        square = dot(p.moved[i], p.moved[i]) + dot(p.turns[i], p.turns[i])
-        missing[i] = P * (b - a + dot(n, way)) * (square > close) / np.maximum(square, TINY)
-        x, y, xx, xy, yy = n.real, n.imag, p.bend[0, i], p.bend[1, i], p.bend[2, i]
-        T, to_x, to_y, change = 0.0, 0.0, 0.0, 0.0
-        if friction > 0.0:
-            aside, up = from_anchor(pair.poses[NOW], p.last[i].real, p.last[i].imag,
-                                    memory[ANCHOR_X, m], memory[ANCHOR_Y, m])
-            slip, k = up * x - aside * y, sticking * area
-            trial = k * (slip + extrapolates * (slip - memory[SLIP, m]))
-            T, sticks = return_mapping(trial, friction * P)
-            sticks = np.maximum(sticks, all_stick)
-            change = friction * np.sign(trial) * (1.0 - sticks) * c
-            # the slip changes along the surface, and as that turns, in a mean by half of it
-            turning = (1.0 + extrapolates) * k * sticks
-            stick = turning if same else 2.0 * turning
-            to_x = turning * (xx * up - xy * aside) - stick * y
-            to_y = turning * (xy * up - yy * aside) + stick * x
-        pressure[i], force[i] = P, scaled(-P, n) + scaled(T, turned(n))
-        K[0, i] = c * x * x - P * xx - to_x * y + change * x * y - T * xy
-        K[1, i] = c * x * y - P * xy - to_y * y + change * y * y - T * yy
-        K[2, i] = c * x * y - P * xy + to_x * x - change * x * x + T * xx
-        K[3, i] = c * y * y - P * yy + to_y * x - change * x * y + T * xy
+def _from_anchor(pose, x, anchor):
+    """The way of a point from an anchor in the obstacle's frame."""
+    cos, sin, a, b = pose[2] - 1.0, pose[3], anchor.real - pose[4], anchor.imag - pose[5]
+    return vector(x.real - pose[0] - anchor.real - cos * a + sin * b,
+                  x.imag - pose[1] - anchor.imag - sin * a - cos * b)
 
 
 @source
-def _tangential(pair):
-    """Coefficient of friction, zero without anchors; 1 if all points stick; stiffness per area."""
-    firmness, anchored = pair.common[LARGEST + pair.number + pair.k], pair.common[ANCHORED]
-    return (pair.numbers[FRICTION] * np.minimum(anchored, 1.0), 1.0 * (anchored > 1.0),
-            pair.numbers[STICKING] * (1.0 + firmness))
+def response(pair, same, touch):
+    """Pressures and friction of points of :func:`touch_of`."""
+    return respond(touch, transition(pair), pair.law.friction * np.minimum(
+        pair.common[ANCHORED], 1.0), 1.0 * (pair.common[ANCHORED] > 1.0), 1.0 if same else 2.0)
 
 
-@apart("contacts", PAIR, float, TOUCH, C1, C1, C1, F2)
-def damp(pair, factor, p, moved, turns, force, K):
-    """Set damping forces proportional to the pressure at a velocity, and their derivatives."""
-    damping, width = pair.numbers[DAMPING], transition(pair)
-    for i in indices(force.size):
-        k = pair.numbers[STIFFNESS] * hardening(pair) * pair.points[AREA, p.at[i]]
-        n, (u, across) = p.normal[i], lever(pair, p, i)
-        way = moved[i] - scaled(dot(across, turns[i]), u)
-        loss = damping_loss(pair.poses[NOW], damping, n.real, n.imag, p.place[0, i],
-                            p.place[1, i], way.real, way.imag)
-        P = k * mean_pressure(p.before[i], p.before[i], width)
-        c = factor * P * damping * (loss < 1.0) - loss * k * pressure_slope(p.before[i], width)
-        force[i] = scaled(P * loss, n)
-        K[0, i], K[1, i] = c * n.real * n.real, c * n.real * n.imag
-        K[2, i], K[3, i] = c * n.imag * n.real, c * n.imag * n.imag
+@source
+def set_rates(pair, v, at, rates):
+    """Set velocities of positions and slopes, (4, n)."""
+    x, t = placed(pair, v, 0.0, at)
+    for i in indices(at.size):
+        put(rates, 0, i, x[i])
+        put(rates, 1, i, t[i])
+
+
+@apart("contacts", PAIR, bool, TOUCH, SPOT, RESPONSE, F2)
+def _set_curvature(pair, same, touch, spot, r, K):
+    """Set the derivatives due to directions that turn; (x, y) in row 4 x + y."""
+    half = 1.0 if same else 0.5
+    for i in indices(touch.k.size):
+        n, t, offset, w = spot.normal[i], spot.slope[i], pair.offsets[touch.at[i]], spot.away[i]
+        P, T, s = r.pressure[i], r.friction[i], half * r.spring[i]
+        xx, xy, yy = spot.bend[0, i], spot.bend[1, i], spot.bend[2, i]
+        a, b = xy * w.real - xx * w.imag, yy * w.real - xy * w.imag  # the tangent at the anchor
+        # of the surface point, then of position and slope
+        k = ((s * n.imag * a - P * xx - T * xy, s * n.imag * b - P * xy - T * yy),
+             (T * xx - P * xy - s * n.real * a, T * xy - P * yy - s * n.real * b))
+        p, q = by_slope(t, offset, vector(1.0, 0.0)), by_slope(t, offset, vector(0.0, 1.0))
+        by = (1.0, 0.0, p.real, p.imag), (0.0, 1.0, q.real, q.imag)
+        for x in range(4):
+            for y in range(4):
+                K[4 * x + y, i] = (by[0][x] * (k[0][0] * by[0][y] + k[0][1] * by[1][y])
+                                   + by[1][x] * (k[1][0] * by[0][y] + k[1][1] * by[1][y]))
+        add_bend(t, offset, scaled(-P, n) + scaled(T, turned(n)), i, K)
+
+
+@apart("contacts", PAIR, float, TOUCH, SPOT, F2, F2, F2)
+def damp(pair, factor, touch, spot, rates, R, K):
+    """Set damping forces proportional to the pressure at rates, and their derivatives: those by
+    velocities times a factor, and by positions (Hunt and Crossley)."""
+    width, damping, pose, speed = transition(pair), pair.law.damping, pair.poses[NOW], np.empty(
+        touch.k.size)
+    product(touch.gap, rates, speed)
+    for i in indices(speed.size):
+        n, k, a = spot.normal[i], touch.k[i], touch.before[i]
+        right, up = spot.place[0, i] - pose[0] - pose[4], spot.place[1, i] - pose[1] - pose[5]
+        obstacle = vector(pose[6] - pose[8] * up, pose[7] + pose[8] * right)
+        # the share of the pressure that is lost, at most all
+        loss = np.minimum(damping * (speed[i] - dot(n, obstacle)), 1.0)
+        P = k * mean_pressure(a, a, width)
+        c = factor * P * damping * (loss < 1.0) - loss * k * pressure_slope(a, width)
+        for x in range(4):
+            R[x, i] = P * loss * touch.gap[x, i]
+            for y in range(4):
+                K[4 * x + y, i] = c * touch.gap[x, i] * touch.gap[y, i]
+        add_bend(spot.slope[i], pair.offsets[touch.at[i]], scaled(P * loss, n), i, K)
 
 
 # history data
 
 
-@apart("contacts", PAIR, bool, TOUCH, F1, F1)
-def _settle(pair, same, p, pressure, out):
+@source
+def _settle(pair, same, touch, spot, r, out):
     """Move anchors of slipping points to the limit of sticking; add the work to ``out[0]``."""
-    friction, _, sticking = _tangential(pair)
-    pose, memory = pair.poses[NOW], pair.memory
-    augmented, lost = pair.numbers[TOLERANCE] > 0.0, np.empty(pressure.size)
-    extrapolates = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
+    pose, lost, augmented = pair.poses[NOW], np.empty(touch.k.size), pair.law.tolerance > 0.0
+    friction = pair.law.friction * np.minimum(pair.common[ANCHORED], 1.0) / (
+        pair.law.stiffness * (1.0 + pair.firmness[0]))
+    product(touch.slip, touch.moved, lost)
     for i in indices(lost.size):
-        m, n, last = p.at[i], p.normal[i], p.last[i]
-        aside, up = from_anchor(pose, last.real, last.imag, memory[ANCHOR_X, m],
-                                memory[ANCHOR_Y, m])
-        slip = up * n.real - aside * n.imag
-        k, limit, (u, across) = sticking * pair.points[AREA, m], friction * pressure[i], lever(
-            pair, p, i)
-        gone = cross(n, p.moved[i] - scaled(dot(across, p.turns[i]), u))
+        m, n, last, slip = touch.at[i], spot.normal[i], spot.last[i], spot.slip[i]
         if same:
-            gone = slip - memory[SLIP, m]
-        T, _ = return_mapping(k * (slip + extrapolates * gone), limit)
-        after, _ = return_mapping(slip, np.maximum(
-            (1.0 - INSIDE) * limit / k - NOWHERE * pair.numbers[RADIUS], 0.0))
-        lost[i] = T * gone
+            lost[i] = slip - pair.slips[m]
+        lost[i] *= r.friction[i]
         if augmented:
-            lost[i] += pressure[i] * (p.after[i] - p.before[i])
+            lost[i] += r.pressure[i] * (touch.after[i] - touch.before[i])
+        limit = friction * r.pressure[i] / pair.areas[m]
+        after, _ = return_mapping(slip, np.maximum(
+            (1.0 - INSIDE) * limit - NOWHERE * pair.law.radius, 0.0))
         x, y = last.real + after * n.imag - pose[0], last.imag - after * n.real - pose[1]
         a, b, cos, sin = x - pose[4], y - pose[5], pose[2] - 1.0, pose[3]
-        memory[SLIP, m] = after
-        memory[ANCHOR_X, m] = x + cos * a + sin * b
-        memory[ANCHOR_Y, m] = y + cos * b - sin * a
-    add_each(out, 0 * p.at, lost)
+        pair.slips[m] = after
+        pair.anchors[m] = vector(x + cos * a + sin * b, y + cos * b - sin * a)
+    add_each(out, 0 * touch.at, lost)
 
 
-@apart("contacts", PAIR, I1, F1, F1)
+@source
 def _augment(pair, at, depth, out):
     """Increase multipliers by penetrations, decrease them by gaps, beyond the tolerance."""
-    tolerance, multiplier = pair.numbers[TOLERANCE], pair.memory[MULTIPLIER]
+    tolerance, multipliers, largest = pair.law.tolerance, pair.multipliers, pair.largest
     if tolerance == 0.0:
         return
-    where, far, square = 0 * at, np.empty(at.size), np.empty(at.size)
-    k = hardening(pair)
+    where, far, square, k = 0 * at, np.empty(at.size), np.empty(at.size), hardening(pair)
     for i in indices(at.size):
-        before = multiplier[at[i]] / k
+        before = multipliers[at[i]] / k
         change = np.maximum(depth[i], 0.0) - before
         far[i] = 1.0 * (np.abs(change) > tolerance)
         after = k * (before + far[i] * change)
-        multiplier[at[i]] = after
+        multipliers[at[i]] = after
         square[i] = after * after
     add_each(out, where, far)
-    largest = pair.common[LARGEST + pair.k:LARGEST + pair.k + 1]
     largest[0] = 0.0
     add_each(largest, where, square)
     largest[0] = np.sqrt(largest[0])  # no less than it
 
 
-# from points to degrees of freedom
-
-
-@apart("contacts", PAIR, TOUCH, C1, F1, F1)
-def _add_force(pair, p, force, missing, out):
-    """Add forces on surface points to those on degrees of freedom."""
-    n = force.size
-    turn, value, where = np.empty(n, np.complex128), np.empty(n, np.complex128), (
-        pair.first[p.at] // 2)
-    for i in indices(n):
-        u, across = lever(pair, p, i)
-        turn[i] = scaled(missing[i], p.turns[i]) - scaled(dot(u, force[i]), across)
-        force[i] += scaled(missing[i], p.moved[i])
-    for a in range(pair.weights.shape[0]):
-        row = pair.weights[a]
-        for i in indices(n):
-            value[i] = scaled(row[p.at[i]], force[i])
-        if pair.slopes.shape[0] > 0:
-            row = pair.slopes[a]
-            for i in indices(n):
-                value[i] += scaled(row[p.at[i]], turn[i])
-        add_each(out.view(np.complex128)[a:], where, value)
-
-
-@apart("contacts", PAIR, TOUCH, C1, F2, F2)
-def _stiffness(pair, p, force, K, S):
-    """Derivative of the force on position and slope; entry (c, d) in row 4 c + d."""
-    for i in indices(force.size):
-        u, v = lever(pair, p, i)
-        a, k = (v.real, v.imag), ((K[0, i], K[1, i]), (K[2, i], K[3, i]))
-        left = (k[0][0] * u.real + k[1][0] * u.imag, k[0][1] * u.real + k[1][1] * u.imag)
-        right = (k[0][0] * u.real + k[0][1] * u.imag, k[1][0] * u.real + k[1][1] * u.imag)
-        both = left[0] * u.real + left[1] * u.imag
-        for c in range(2):
-            for d in range(2):
-                S[4 * c + d, i] = k[c][d]
-                S[4 * c + 2 + d, i] = -right[c] * a[d]
-                S[4 * (2 + c) + d, i] = -a[c] * left[d]
-                S[4 * (2 + c) + 2 + d, i] = both * a[c] * a[d]
-        # and the second derivative of the surface by the slope
-        t, f = p.slope[i], force[i]
-        square = np.maximum(dot(t, t), SHORT)
-        c = pair.points[OFFSET, p.at[i]] / square / square / np.sqrt(square)
-        over, along = c * cross(f, t), c * dot(f, t)
-        x, y = t.real, t.imag
-        mixed = along * (x * x - y * y) - over * x * y
-        S[10, i] += over * y * y - 2.0 * along * x * y
-        S[11, i] += mixed
-        S[14, i] += mixed
-        S[15, i] += over * x * x + 2.0 * along * x * y
-
-
-@apart("contacts", C1, C1, F2, F1)
-def _add_along(moved, turns, S, out):
-    """Add the derivative of the work along the velocities to ``out[0]``."""
-    value, zero = np.zeros(moved.size), np.zeros(moved.size, np.int64)
-    for i in indices(value.size):
-        rates = (moved[i].real, moved[i].imag, turns[i].real, turns[i].imag)
-        for a in range(4):
-            for b in range(4):
-                value[i] += S[4 * a + b, i] * rates[a] * rates[b]
-    add_each(out, zero, value)
-
-
 @apart("contacts", PAIR, Annotated[Request, MADE], I1, F2, F1)
 def _add_stiffness(pair, request, at, S, flat):
     """Add the derivatives to a band matrix, or its lower half if only that is stored."""
-    value, where = np.empty(at.size), request.ld * pair.first[at]
-    n = 2 * pair.weights.shape[0]
+    value, where, n = np.empty(at.size), request.ld * 2 * pair.dofs[0][at], 2 * len(pair.weights)
     for a in range(n):
         p, c = pair.weights[a // 2], 4 * (a % 2)
         for b in range(n if request.top > 0 else a + 1):

@@ -15,7 +15,13 @@ Friction is a spring along the surface from an anchor to the point, limited by C
 import numpy as np
 
 from ...core import source
-from .gap import TINY
+from .tables import TINY
+
+
+@source
+def potential(a, width):
+    """S(a)."""
+    return (np.maximum(a, 0.0) ** 3 - np.maximum(a - width, 0.0) ** 3) / (6.0 * width)
 
 
 @source
@@ -52,19 +58,3 @@ def mean_pressure_slope(a, b, width, pressure):
 def return_mapping(trial, limit):
     """Friction traction from a trial traction, and 1 for sticking, 0 for slipping."""
     return np.minimum(np.maximum(trial, -limit), limit), 1.0 * (np.abs(trial) < limit)
-
-
-@source
-def from_anchor(pose, x, y, anchor_x, anchor_y):
-    """The way of a point from its anchor, which moves with the obstacle."""
-    cos, sin, a, b = pose[2] - 1.0, pose[3], anchor_x - pose[4], anchor_y - pose[5]
-    return (x - pose[0] - anchor_x - cos * a + sin * b,
-            y - pose[1] - anchor_y - sin * a - cos * b)
-
-
-@source
-def damping_loss(pose, damping, nx, ny, x, y, vx, vy):
-    """Fraction of the pressure lost by separation velocity (Hunt and Crossley), at most 1."""
-    p = vx + pose[8] * (y - pose[1] - pose[5]) - pose[6]
-    q = vy - pose[8] * (x - pose[0] - pose[4]) - pose[7]
-    return np.minimum(damping * (p * nx + q * ny), 1.0)

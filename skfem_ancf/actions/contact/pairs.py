@@ -18,9 +18,11 @@ from ...core import (C1, C2, C3, F1, F2, I1, I2, MADE, apart, everywhere, indice
                      source, where)
 from ...core.band import copy, dot as inner, largest, smallest
 from ...core.callbacks import SEARCHES, call_custom, owner
-from ..tables import add_each, least_each
-from .laws import mean_pressure, mean_pressure_slope, return_mapping
+from ..tables import least_each
+from .laws import mean_pressure, return_mapping
 from .plane import cross, dot, scaled, size, turned, vector
+from .points import (Touch, add_bend, add_coupling, add_resistance, by_slope, product, put, respond,
+                     spread)
 
 #: Iterations of the projection, its largest step along a facet, and how far it may leave it.
 PROJECT, FAR, LEFT = 12, 1.0, 1.5
@@ -39,8 +41,8 @@ SAME = 0.8
 MEANS, CLOSE = 8, 1e-9
 #: The gap where nothing is.
 NOTHING = 1e300
-#: Vectors r, t, c, T of a contact point, and their components.
-VECTORS, COMPONENTS = 4, 8
+#: Components of the vectors r, t, c, T of a contact point.
+COMPONENTS = 8
 
 
 class Candidates(NamedTuple):
@@ -113,7 +115,7 @@ class Meeting(NamedTuple):
     zeta: F1
     before: F1
     after: F1
-    share: F1  # correction of the mean pressure
+    share: F1  # correction of the stiffness, for exact work
 
 
 PAIRS: TypeAlias = PairTables
@@ -374,9 +376,9 @@ def stiffness_of(t, p, e):
 
 
 @source
-def rubbing(t, end, p, e, k, limit):
-    """Friction of pairs at the end of a step: force along the facet, 1 for sticking, and the rate
-    of the slip by the place along the facet. Those that have parted have none."""
+def slip_along(t, end, p, e):
+    """Slip of pairs along the facet at the end of a step, 1 for those with an anchor there, and the
+    rate of the slip by the place along the facet. Those that have parted have none."""
     zeta, n = end.zeta[p], t.of.size
     _, T, A = along(end.curve, e, zeta)
     length = size(T)
@@ -384,8 +386,7 @@ def rubbing(t, end, p, e, k, limit):
     rate = (length - depth / length) * 2.0 / t.lengths[e]
     held = (end.e[p] >= 0) & (t.history[1 + p] == t.curves[e] + 1.0)
     slip = where(held, rate * (place(t, e, zeta) - t.history[1 + n + p]), 0.0)
-    force, sticks = return_mapping(k * slip, limit)
-    return force, where(held, sticks, 0.0), rate
+    return slip, 1.0 * held, rate
 
 
 # derivatives of the gap and of the place along the facet by r, t, c and T
@@ -413,12 +414,13 @@ def mean_slope(a, b, side, s):
 
 
 @source
-def slip_row(v, s):
-    """Derivative of the place of the point along the facet, ``conj(T) (x - c) / |T|``."""
-    short, length = 1.0 / size(v[1]), 1.0 / size(v[3])
-    across, way = turned(scaled(short, v[1])), scaled(length, v[3])
-    return way, scaled(s * short * cross(across, way), across), -way, scaled(
-        length, v[0] + scaled(s, across) - v[2])
+def slip_row(a, b, s):
+    """Derivative of the place of the point along the facet, ``conj(T) (x - c) / |T|``, for the mean
+    of r, t, c and T at two states."""
+    t, T = scaled(0.5, a[1] + b[1]), scaled(0.5, a[3] + b[3])
+    length = 1.0 / size(T)
+    way, x = scaled(length, T), scaled(0.5, a[0] + b[0]) + scaled(s / size(t), turned(t))
+    return way, by_slope(t, s, way), -way, scaled(length, x - scaled(0.5, a[2] + b[2]))
 
 
 @source
@@ -430,10 +432,26 @@ def vectors(t, found, p, e, zeta):
 
 
 @source
-def middle(a, b):
-    """The mean of r, t, c and T at two states."""
-    return (scaled(0.5, a[0] + b[0]), scaled(0.5, a[1] + b[1]), scaled(0.5, a[2] + b[2]),
-            scaled(0.5, a[3] + b[3]))
+def touch_of(t, f0, f1, met):
+    """The :class:`~skfem_ancf.actions.contact.points.Touch` of pairs."""
+    n = met.at.size
+    gap, slip, moved, k, trial, spring = (
+        np.empty((COMPONENTS, n)), np.empty((COMPONENTS, n)), np.empty((COMPONENTS, n)),
+        np.empty(n), np.zeros(n), np.zeros(n))
+    for i in indices(n):
+        p, e = met.at[i], met.e[i]
+        s, firm = t.sides[t.of[p]] * t.offsets[t.of[p]], stiffness_of(t, p, e)
+        a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
+        by_gap, by_slip = mean_slope(a, b, t.sides[e], s), slip_row(a, b, s)
+        for v in range(COMPONENTS // 2):
+            put(gap, v, i, by_gap[v])
+            put(slip, v, i, by_slip[v])
+            put(moved, v, i, b[v] - a[v])
+        k[i] = firm * met.share[i]
+        if t.friction > 0.0:
+            way, held, _ = slip_along(t, f1, p, e)
+            trial[i], spring[i] = firm * way, firm * held
+    return Touch(met.at, k, met.before, met.after, np.zeros(n), moved, gap, slip, trial, spring)
 
 
 # forces
@@ -462,84 +480,44 @@ def pair_force(t, z0, z1, same, out, clear):
     clear[0] = f1.clear[0]
     met = meet(t, same, f0, f1)
     if met.at.size > 0:
-        R = np.empty((VECTORS, met.at.size), np.complex128)
-        forces(t, f0, f1, met, R)
-        _spread(t, met, R, out)
+        touch = touch_of(t, f0, f1, met)
+        _spread(t, met, touch, respond(touch, t.width, t.friction, 0.0, 1.0), out)
 
 
 @source
-def forces(t, f0, f1, met, R):
-    """Set the resisting forces of pairs on r, t, c and T."""
-    for i in indices(met.at.size):
-        p, e = met.at[i], met.e[i]
-        s = t.sides[t.of[p]] * t.offsets[t.of[p]]
-        a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
-        k = stiffness_of(t, p, e)
-        pressure = k * mean_pressure(met.before[i], met.after[i], t.width) * met.share[i]
-        g = mean_slope(a, b, t.sides[e], s)
-        R[0, i], R[1, i] = scaled(-pressure, g[0]), scaled(-pressure, g[1])
-        R[2, i], R[3, i] = scaled(-pressure, g[2]), scaled(-pressure, g[3])
-        if t.friction > 0.0:
-            force, _, _ = rubbing(t, f1, p, e, k, t.friction * pressure)
-            w = slip_row(middle(a, b), s)
-            R[0, i] += scaled(force, w[0])
-            R[1, i] += scaled(force, w[1])
-            R[2, i] += scaled(force, w[2])
-            R[3, i] += scaled(force, w[3])
-
-
-@source
-def _spread(t, met, R, out):
-    """Add forces on r, t, c and T to those on degrees of freedom."""
-    value = np.empty(met.at.size, np.complex128)
-    for b in range(t.N.shape[0]):
-        N, D, rows = t.N[b], t.D[b], t.point_dofs[b]
-        for i in indices(value.size):
-            p = met.at[i]
-            value[i] = np.conj(N[p]) * R[0, i] + np.conj(D[p]) * R[1, i]
-        add_each(out, rows[met.at], value)
-        weights, rows = t.weights[b], t.dofs[b]
-        for i in indices(value.size):
-            c, T, _ = along(weights, met.e[i], met.zeta[i])
-            value[i] = np.conj(c) * R[2, i] + np.conj(T) * R[3, i]
-        add_each(out, rows[met.e], value)
-
-
-@source
-def potential(t, found):
-    """The energy of the pressure."""
-    at = np.nonzero(found.e >= 0)[0]
-    k, S = np.empty(at.size), np.empty(at.size)
-    for i in indices(at.size):
-        p = at[i]
-        a = t.begins[p] - found.gap[p]
-        k[i] = stiffness_of(t, p, found.e[p])
-        S[i] = (np.maximum(a, 0.0) ** 3 - np.maximum(a - t.width, 0.0) ** 3) / (6.0 * t.width)
-    return inner(k, S)
+def _spread(t, met, touch, r, out):
+    """Add the forces to those on degrees of freedom."""
+    n, B = met.at.size, t.N.shape[0]
+    R, c, T, dofs = np.zeros((COMPONENTS, n)), np.empty((B, n), np.complex128), np.empty(
+        (B, n), np.complex128), np.empty((B, n), np.int64)
+    add_resistance(touch, r, R)
+    spread(t.point_dofs, t.N, t.D, met.at, R, out)
+    for b in range(B):
+        weights = t.weights[b]
+        for i in indices(n):
+            c[b, i], T[b, i], _ = along(weights, met.e[i], met.zeta[i])
+            dofs[b, i] = t.dofs[b, met.e[i]]
+    spread(dofs, c, T, np.arange(n), R[4:], out)
 
 
 @apart("pairs", PAIRS, C1, C1, F1, returns=float)
 def pair_accept(t, z0, z1, after):
     """Set the history at the end of a step between two states, and return what it dissipates."""
     f0, f1 = both_faced(t, z0, z1, False)
-    met, force, n = meet(t, False, f0, f1), np.zeros(z0.size, np.complex128), t.of.size
-    way, R = np.empty(z0.size, np.complex128), np.empty((VECTORS, met.at.size), np.complex128)
-    if met.at.size > 0:
-        forces(t, f0, f1, met, R)
-        _spread(t, met, R, force)
-    for k in indices(way.size):
-        way[k] = z1[k] - z0[k]
+    met, n = meet(t, False, f0, f1), t.of.size
+    touch = touch_of(t, f0, f1, met)
+    r, lost = respond(touch, t.width, t.friction, 0.0, 1.0), np.empty(met.at.size)
+    product(touch.slip, touch.moved, lost)
     at = np.nonzero(f1.e >= 0)[0]
     curves, anchors = np.zeros(n), np.zeros(n)
     for i in indices(at.size):
         p, e = at[i], f1.e[at[i]]
-        k, a = stiffness_of(t, p, e), t.begins[p] - f1.gap[p]
-        rub, _, rate = rubbing(t, f1, p, e, k, t.friction * k * mean_pressure(a, a, t.width))
-        curves[p], anchors[p] = t.curves[e] + 1.0, place(t, e, f1.zeta[p]) - rub / k / rate
+        a, (slip, _, rate) = t.begins[p] - f1.gap[p], slip_along(t, f1, p, e)
+        left, _ = return_mapping(slip, t.friction * mean_pressure(a, a, t.width))
+        curves[p], anchors[p] = t.curves[e] + 1.0, place(t, e, f1.zeta[p]) - left / rate
     copy(curves, after[1:1 + n])
     copy(anchors, after[1 + n:])
-    work = inner(force.view(np.float64), way.view(np.float64))
-    return work + potential(t, f0) - potential(t, f1)
+    return inner(r.friction, lost)
 
 
 @apart("pairs", PAIRS, C1, C1, bool, I1, F1, F2, returns=int)
@@ -548,67 +526,40 @@ def pair_stiffness(t, z0, z1, same, facets, zeta, K):
     ``facets`` (P,) get those of points in contact, else -1, ``zeta`` (P,) the places on them, K the
     derivatives, (64, n), for P columns."""
     f0, f1 = both_faced(t, z0, z1, same)
-    met = meet(t, same, f0, f1)
-    n, friction, twice = met.at.size, t.friction, 1.0 if same else 2.0
+    met, n = meet(t, same, f0, f1), COMPONENTS
+    touch = touch_of(t, f0, f1, met)
+    r = respond(touch, t.width, t.friction, 0.0, 1.0 if same else 2.0)
     for p in indices(facets.size):
         facets[p] = -1
-    G, S, turns = np.empty((COMPONENTS, n)), np.empty((COMPONENTS, n)), np.zeros((COMPONENTS, n))
-    M, unit, across = np.empty((COMPONENTS, n)), np.zeros((COMPONENTS, n)), np.zeros(
-        (COMPONENTS, n))
-    ways = np.zeros((COMPONENTS, n))
-    for i in indices(n):
+    for i in indices(met.at.size):
         p, e = met.at[i], met.e[i]
         facets[p], zeta[p] = e, met.zeta[i]
-        s, side, k = t.sides[t.of[p]] * t.offsets[t.of[p]], t.sides[e], stiffness_of(t, p, e)
-        a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
-        v = middle(a, b)
-        mean = mean_pressure(met.before[i], met.after[i], t.width)
-        slope = k * mean_pressure_slope(met.before[i], met.after[i], t.width, mean)
-        _put(G, i, mean_slope(a, b, side, s))
-        row = slip_row(v, s)
-        _put(S, i, row)
+        (x0, d0, c0, T0), (x1, d1, c1, T1) = (vectors(t, f0, p, e, met.zeta[i]), vectors(
+            t, f1, p, e, met.zeta[i]))
+        d, T, s = scaled(0.5, d0 + d1), scaled(0.5, T0 + T1), t.sides[t.of[p]] * t.offsets[t.of[p]]
         # curvature of the gap: of the facet, of its turns and of the point along it
-        bend = 0.5 * (along(f0.curve, e, met.zeta[i])[2] + along(f1.curve, e, met.zeta[i])[2])
-        length, short = size(v[3]), size(v[1])
-        way, d = v[3] / length, v[1] / short
-        outer = side * 1j * way
-        depth, curl, square = dot(outer, v[0] + 1j * s * d - v[2]), dot(outer, bend), length**2
-        share = length / (square - depth * curl)
-        turns[6, i], turns[7, i] = outer.real, outer.imag
-        ways[6, i], ways[7, i] = way.real, way.imag
-        _put(M, i, (share * row[0], share * row[1], share * row[2], share * row[3]))
-        unit[2, i], unit[3, i] = d.real / short, d.imag / short
-        across[2, i], across[3, i] = -unit[3, i], unit[2, i]
-        force, sticks = 0.0, 0.0
-        if friction > 0.0:
-            force, sticks, _ = rubbing(t, f1, p, e, k, friction * k * mean * met.share[i])
-        change = friction * np.sign(force) * (1.0 - sticks) * slope
-        load = k * mean
-        push = load * outer - force * way
-        both, bent = s * dot(push, d), s * dot(push, 1j * d)
-        # friction turns with the facet; the speed along it, 1 / share, changes the slip
-        turned_by, stretch, rub = depth / square, dot(way, bend), force / length
-        more = 1.0 + turned_by * curl
-        for x in range(COMPONENTS):
-            held = twice * sticks * S[x, i]
-            slips, w = held * force * share, turned_by * (turns[x, i] + curl * M[x, i])
-            by_g = slope * G[x, i] - change * S[x, i] + rub * turns[x, i] - slips * curl / length
-            by_turn = load * (M[x, i] - w) + rub * G[x, i] + turned_by * (
-                slips * stretch - force * ways[x, i])
-            by_m = load * (curl * (M[x, i] - w) + turns[x, i]) + rub * curl * G[x, i] - force * (
-                more * ways[x, i] + turned_by * stretch * turns[x, i]) + slips * stretch * (
-                    2.0 * more - 1.0)
-            by_way = slips * more - force * turned_by * turns[x, i]
-            by_unit, by_across = -both * across[x, i], bent * across[x, i] - both * unit[x, i]
-            for y in range(COMPONENTS):
-                K[COMPONENTS * x + y, i] = (
-                    by_g * G[y, i] + held * k * S[y, i] + by_turn * turns[y, i] + by_m * M[y, i]
-                    + by_way * ways[y, i] + by_unit * unit[y, i] + by_across * across[y, i])
-    return n
-
-
-@source
-def _put(rows, i, v):
-    """Set components of r, t, c and T."""
-    rows[0, i], rows[1, i], rows[2, i], rows[3, i] = v[0].real, v[0].imag, v[1].real, v[1].imag
-    rows[4, i], rows[5, i], rows[6, i], rows[7, i] = v[2].real, v[2].imag, v[3].real, v[3].imag
+        bend = scaled(0.5, along(f0.curve, e, met.zeta[i])[2] + along(
+            f1.curve, e, met.zeta[i])[2])
+        length = size(T)
+        outer, x = scaled(t.sides[e] / length, turned(T)), scaled(0.5, x0 + x1 - c0 - c1) + scaled(
+            s / size(d), turned(d))
+        way, P, F = scaled(1.0 / length, T), r.pressure[i], r.friction[i] / length
+        # the way from the anchor stretches
+        held = (1.0 if same else 2.0) * r.friction[i] * (r.spring[i] > 0.0)
+        depth, curl, stretch = dot(outer, x) / length, dot(outer, bend), dot(way, bend)
+        share = 1.0 / (length - depth * curl)  # of the slip in the change of zeta
+        turns = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, outer.real, outer.imag)
+        grows = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, way.real, way.imag)
+        for a in range(n):
+            on = share * touch.slip[a, i]
+            w = on - depth / length * (turns[a] + curl * on)
+            for b in range(n):
+                at = share * touch.slip[b, i]
+                K[n * a + b, i] = P * (w * turns[b] + (curl * w + turns[a]) * at) + F * (
+                    touch.gap[a, i] * (turns[b] + curl * at)
+                    + turns[a] * (touch.gap[b, i] - depth * (grows[b] + stretch * at))
+                    + grows[a] * (touch.slip[b, i] - depth * turns[b] - 2.0 * length * at)) + (
+                    held * on * (grows[b] + stretch * at - curl / length * touch.gap[b, i]))
+        add_bend(d, s, scaled(-P, outer) + scaled(r.friction[i], way), i, K)
+    add_coupling(touch, r, K[:, :met.at.size])
+    return met.at.size

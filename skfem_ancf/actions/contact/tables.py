@@ -1,42 +1,24 @@
-"""Tables of the contact kernels: surface points, obstacles, and history data. A contact pair is the
-surface of one beam with one obstacle. Its arrays are consecutive parts of those in
-:class:`ContactTables`; :func:`pair_of` returns views with names."""
+"""Tables of contact with obstacles. A pair is the surface of one beam with one obstacle."""
 
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...core.band import largest
-from ...core import F1, F2, I1, MADE, indices, shaped, source
+from ...core import C1, F1, F2, I1, I2, indices, primitive, source
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)
 #: Requests to all pairs, see :class:`Request`.
 FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64, range(7))
-#: Header of a pair: kind and number of its obstacle, numbers of elements, of points per element, of
-#: pairs of degrees of freedom per point, flag of normals that depend on slopes, number of shape
-#: parameters; offsets of its integers, numbers and history data.
-KIND, OBSTACLE, ELEMENTS, POINTS, PAIRS, SLOPES, SHAPE, INTS, FLOATS, MEMORY = range(10)
-HEADER = 10
-#: Parameters of a pair: penalty stiffness, width of the transition, friction, tangential stiffness,
-#: damping, additional stiffness in a time step, largest reference distance of a point from the
-#: middle of its element, 1 or -1 for outside or inside of the shape, and the tolerance of the
-#: augmented Lagrangian, zero for the penalty.
-STIFFNESS, WIDTH, FRICTION, STICKING, DAMPING, INERTIA, RADIUS, SIDE, TOLERANCE = range(9)
-NUMBERS = 9
-#: Rows of reference data of points: area, distance from the axis, position and slope.
-AREA, OFFSET, START = range(3)
-#: Rows of the points' history data: the multiplier of the augmented Lagrangian over the stiffness,
-#: the anchor of friction in the obstacle's frame, and the distance of the point from it.
-MULTIPLIER, ANCHOR_X, ANCHOR_Y, SLIP = range(4)
 #: Pose of an obstacle: displacement, cosine and sine of its angle, its pivot, its velocities, and
 #: the time. There are three: at a time, and at the beginning and end of a mean.
 POSE, POSES = 10, 30
 NOW, BEGIN, END = map(np.int64, range(3))
 #: History data of all pairs: 1 if points stick to anchors; 1 / dt^2 of the last time step; 1 if
-#: points with multipliers are bilateral; for each pair the largest multiplier, then the factor of
-#: hardening; then the data of the points; at the end the angles of torsional springs.
-ANCHORED, RATE, BILATERAL, LARGEST = range(4)
+#: points with multipliers are bilateral. Then follow those of :class:`Pair`: ``largest`` and
+#: ``firmness`` of all, the data of points, and at the end the angles of torsional springs.
+ANCHORED, RATE, BILATERAL, HEAD = range(4)
 #: Flags of history data: anchors, angles of torsional springs, multipliers.
 ANCHORS, TURNS, PRESSURES = 1, 2, 4
 TINY = 1e-200
@@ -63,16 +45,15 @@ class Request(NamedTuple):
 
 
 class ContactTables(NamedTuple):
-    """The obstacles of a scene, as ``number`` pairs. ``ints`` and ``floats`` are headers of pairs,
-    DOFs, and parameters of points and shapes; ``poses`` those of obstacles at the last time;
-    ``memory`` history data. ``moving`` tells whether poses depend on time, ``custom`` is the handle
-    for poses and user-defined shapes, ``lasting`` the sum of flags of history data: ANCHORS, TURNS,
-    PRESSURES. ``clear`` says where nothing touches, see :func:`is_clear`; it is empty if obstacles
-    move, or have multipliers."""
+    """The obstacles of a scene, as ``number`` pairs: a tuple, or in compiled code their addresses.
+
+    ``poses`` are those of obstacles at the last time; ``memory`` history data. ``moving`` tells
+    whether poses depend on time, ``custom`` is the handle for poses and user-defined shapes,
+    ``lasting`` the sum of flags of history data: ANCHORS, TURNS, PRESSURES. ``clear`` says where
+    nothing touches, see :func:`is_clear`; it is empty if obstacles move, or have multipliers."""
 
     number: int
-    ints: I1
-    floats: F1
+    pairs: I1
     poses: F1
     memory: F1
     moving: int
@@ -81,53 +62,53 @@ class ContactTables(NamedTuple):
     clear: F1
 
 
-class Pair(NamedTuple):
-    """The surface of one beam with one obstacle: views of :class:`ContactTables`. ``first`` is the
-    first degree of freedom of each point's element, (n,); ``weights`` and ``slopes`` those of pairs
-    of degrees of freedom in its position and slope, (pairs, n); ``middles`` positions and weights
-    of element middles; the parameters end with those of the shape. ``common`` is the history data
-    shared by all pairs."""
+class Law(NamedTuple):
+    """Numbers of contact with an obstacle."""
 
-    k: int
-    number: int
+    stiffness: float
+    width: float  # of the transition from no pressure to proportional pressure
+    friction: float
+    damping: float
+    inertia: float  # additional stiffness in a time step, times its square
+    radius: float  # largest reference distance of a point from the middle of its element
+    side: float  # 1 or -1 for outside or inside of the shape
+    tolerance: float  # of the augmented Lagrangian, zero for the penalty
+
+
+class Pair(NamedTuple):
+    """The surface of one beam with one obstacle: points (n,) of elements (m,), with B pairs of
+    degrees of freedom each. The fields from ``common`` on are history data, (1,) or (n,)."""
+
+    obstacle: int  # number, kind and parameters of its shape
+    kind: int
+    shape: F1
     moving: int
     custom: int
-    header: I1
-    first: I1
-    weights: F2
-    slopes: F2
-    points: F2
-    middles: F2
-    numbers: F1
-    poses: F2
-    memory: F2
-    common: F1
+    poses: F2  # at NOW, BEGIN, END
+    dofs: I2  # pairs of degrees of freedom, (B, n)
+    weights: F2  # in the position, (B, n)
+    slopes: F2  # and in the slope of the axis, none with sections
+    areas: F1
+    offsets: F1  # from the axis
+    starts: F2  # reference position and slope, (4, n)
+    middles: F2  # positions and weights of element middles, (2 + 2 B, m)
+    law: Law
+    softness: F1  # factor on the stiffness for difficult equilibria, (1,)
+    common: F1  # of all pairs
+    largest: F1  # the largest multiplier
+    firmness: F1  # the factor of hardening less 1
+    multipliers: F1  # of the augmented Lagrangian, over the stiffness
+    anchors: C1  # of friction, in the obstacle's frame
+    slips: F1  # distances of points from their anchors
 
 
-#: The type of a pair in compiled code.
-PAIR: TypeAlias = Annotated[Pair, MADE]
+PAIR: TypeAlias = Pair
 
 
-@source
+@primitive("skfem_ancf.equations.loops")
 def pair_of(tables, k):
-    """The pair number k."""
-    h, floats = tables.ints[k * HEADER:(k + 1) * HEADER], tables.floats
-    elements, pairs, slopes = h[ELEMENTS], h[PAIRS], h[PAIRS] * h[SLOPES]
-    n, at = elements * h[POINTS], h[FLOATS]
-    points = at + (pairs + slopes) * n
-    middles = points + 6 * n
-    numbers = middles + (2 + 2 * pairs) * elements
-    pose = h[OBSTACLE] * POSES
-    return Pair(
-        k, tables.number, tables.moving, tables.custom, h, tables.ints[h[INTS]:h[INTS] + n],
-        shaped(floats[at:at + pairs * n], (pairs, n)),
-        shaped(floats[at + pairs * n:points], (slopes, n)),
-        shaped(floats[points:middles], (6, n)),
-        shaped(floats[middles:numbers], (2 + 2 * pairs, elements)),
-        floats[numbers:numbers + NUMBERS + h[SHAPE]],
-        shaped(tables.poses[pose:pose + POSES], (3, POSE)),
-        shaped(tables.memory[h[MEMORY]:h[MEMORY] + 4 * n], (4, n)),
-        tables.memory)
+    """The :class:`Pair` number k."""
+    return tables.pairs[k]
 
 
 #: How far points may move from displacements at which nothing touches; 1 if the tangent of the last
@@ -173,11 +154,12 @@ def weights_of_motion(weights: np.ndarray, dofs: np.ndarray, n: int) -> np.ndarr
 @source
 def transition(pair):
     """Width of the transition; shorter in proportion if the obstacle is stiffened."""
-    return pair.numbers[WIDTH] / np.maximum(1.0, 1.0 + pair.common[LARGEST + pair.number + pair.k])
+    return pair.law.width / np.maximum(1.0, 1.0 + pair.firmness[0])
 
 
 @source
 def hardening(pair):
     """Factor on the given stiffness, from loads or time steps."""
-    return (1.0 + pair.common[LARGEST + pair.number + pair.k]
-            + pair.numbers[INERTIA] * pair.common[RATE] / pair.numbers[STIFFNESS])
+    law = pair.law
+    return 1.0 + pair.firmness[0] + law.inertia * pair.common[RATE] / (
+        pair.softness[0] * law.stiffness)

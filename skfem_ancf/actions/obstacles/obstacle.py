@@ -11,6 +11,7 @@ from ...beam import Layout, WhichBeam, select_beam
 from ...core import (Array, ModelWarning, ask_array, gauss_lobatto, refuse, require_function,
                      require_integer, require_not_negative, require_option, require_positive, warn)
 from ..contact.contacts import FIRMER, Group
+from ..contact.tables import Law
 from ..contact.poses import carried, taken_back
 from ..forces.base import ForceElement, KernelElement
 from ..places import Vector
@@ -197,12 +198,12 @@ class Obstacle(ForceElement):
         E, density = stiffest(beam.across, np.arange(mesh.nelements))
         k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
         firmest = 1.0 if self.penalty or augmented else FIRMER * max(1.0, E / (h * k))
-        numbers = np.array([k, self.width or WIDTH * h, self.friction, k, self.damping,
-                            HARDER * density * h * augmented, radius.max(),
-                            -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
+        law = Law(k, self.width or WIDTH * h, self.friction, self.damping,
+                  HARDER * density * h * augmented, float(radius.max()),
+                  -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented)
         return Group(nodes, weights, slopes, areas, offsets, starts, mesh.nelements + 2, m,
                      np.inf if self.shape.inner == np.inf else THROUGH * min(h, self.shape.inner),
-                     h, numbers, firmest)
+                     h, law, firmest)
 
     def _along(self, beam):
         """Points and weights along the elements of a beam."""

@@ -11,9 +11,10 @@ from ...beam import Beam, Layout
 from ...core import (Array, InputError, refuse, require_flag, require_label, require_not_negative,
                      require_positive, shown)
 from ..contact.contacts import SEEN
-from ..contact.laws import mean_pressure
-from ..contact.pairs import (COMPONENTS, VECTORS, along, faced, forces, meet, pair_accept,
-                             pair_force, pair_stiffness, place, potential, rubbing, stiffness_of)
+from ..contact.laws import potential
+from ..contact.pairs import (COMPONENTS, faced, meet, pair_accept, pair_force, pair_stiffness,
+                             place, stiffness_of, touch_of)
+from ..contact.points import add_resistance, respond
 from ..forces.base import ForceElement
 from ..places import Vector
 from .facets import ROUND, facets_of, rounded
@@ -194,8 +195,9 @@ class BodyContact(ForceElement):
         return -_plane(out).T
 
     def potential(self, x: Array, *past: Any) -> float:
-        t = self._tables(past[0])
-        return float(potential(t, faced(t, _complex(x, x)[0])))
+        t, (found, p) = self._tables(past[0]), self._faced(_complex(x, x)[0])
+        return float(stiffness_of(t, p, found.e[p]) @ potential(
+            t.begins[p] - found.gap[p], t.width))
 
     def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Any:
         return self.mean_stiffness(x, x, t, *past)
@@ -284,21 +286,23 @@ class BodyContact(ForceElement):
     def look(self, x: Array, t: float, history: Array) -> tuple[Array, ...]:
         """Contact points, and the points that they touch, (2, n) each, and forces on the first.
         Then pressures, gaps, and True for sticking points, (n,), and the members of both, (n,)."""
-        tables, f, (found, p) = self._tables(history), self._surfaces.facets, self._faced(
-            _complex(x, x)[0])
-        e, gap = found.e[p], found.gap[p]
-        k, a = stiffness_of(tables, p, e), tables.begins[p] - gap
-        pressure = k * mean_pressure(a, a, tables.width)
-        way = along(found.curve, e, found.zeta[p])[1]
-        way = way / np.abs(way)
-        normal, sticks = tables.sides[e] * 1j * way, np.zeros(len(p), bool)
-        force = pressure * normal
-        if self.friction:
-            rub = rubbing(tables, found, p, e, k, self.friction * pressure)[0]
-            force, sticks = force - rub * way, np.abs(rub) < (1.0 - SEEN) * self.friction * pressure
-        at = found.x[p] + self.origin
-        return (_plane(at), _plane(at - gap * normal), _plane(force),
-                pressure / (0.5 * f.areas[p]), gap, sticks, f.members[f.of[p]], f.members[e])
+        f, (met, touch, r, R) = self._surfaces.facets, self._responding(x, history)
+        p, e, normal = met.at, met.e, touch.gap[:2]
+        at, gap = self._faced(_complex(x, x)[0])[0].x[p], self.broad_search.tables.begins[p] - (
+            met.after)
+        at = _plane(at + self.origin)
+        return (at, at - gap * normal, -R[:2], r.pressure / (0.5 * f.areas[p]), gap,
+                np.abs(r.friction) < (1.0 - SEEN) * self.friction * r.pressure,
+                f.members[f.of[p]], f.members[e])
+
+    def _responding(self, x, history):
+        """Points in contact at x: the Meeting, the Touch, the Response, and resisting forces."""
+        t, found = self._tables(history), self._faced(_complex(x, x)[0])[0]
+        met = meet(t, True, found, found)
+        touch = touch_of(t, found, found, met)
+        r, R = respond(touch, t.width, t.friction, 0.0, 1.0), np.zeros(touch.gap.shape)
+        add_resistance(touch, r, R)
+        return met, touch, r, R
 
     def loads_on(self, beam: Beam, first: int, x: Array, history: Array
                  ) -> list[tuple[int, float, Array]]:
@@ -309,11 +313,9 @@ class BodyContact(ForceElement):
         beam, first
             The Beam of the elements, and its first DOF.
         """
-        t, f, found = self._tables(history), self._surfaces.facets, self._faced(
-            _complex(x, x)[0])[0]
-        out, met, nb = list[Any](), meet(t, True, found, found), beam.nd
-        R, p = np.empty((VECTORS, len(met.at)), complex), met.at
-        forces(t, found, found, met, R)
+        t, f, (met, _, _, R) = self.broad_search.tables, self._surfaces.facets, self._responding(
+            x, history)
+        out, p, nb, R = list[Any](), met.at, beam.nd, R[::2] + 1j * R[1::2]
         nodes, C = beam.mesh.t[0] * (nb // 2) + first // 2, self._surfaces.weights(met.e, met.zeta)
         own, other = (-(np.conj(N) * a + np.conj(D) * b).T for (N, D), a, b in (
             ((t.N[:, p], t.D[:, p]), R[0], R[1]), (C, R[2], R[3])))
