@@ -599,9 +599,8 @@ class DomainValues(Values):
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
     """Values at points (xi, eta) of all elements, (2, [nelements,] npoints), flattened."""
-    ne = beam.mesh.nelements
-    part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
+    ne, known = beam.mesh.nelements, hasattr(state, "values_of")
+    number, s = (state.beams.index(beam), state.system.of(beam)) if known else (0, slice(beam.N))
+    part = BeamPoints(beam, number, s, None, np.repeat(np.arange(ne), X.shape[-1]),
                       np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1))
-    if hasattr(state, "values_of"):
-        return state.values_of(beam, part, recover)
-    return Values(part, state.u_of(beam))
+    return state.values_of(part, recover) if known else Values(part, state.u_of(beam))

@@ -98,63 +98,6 @@ class MaterialPoints(NearMisses):
         return found.angular_velocity(self.u[..., s], self.v[..., s])
 
 
-class Derivatives:
-    """Methods of states for derivatives of static solutions by parameters."""
-
-    system: Any
-
-    def gradient(self, J: Any, wrt: Sequence[Any]) -> list[Array]:
-        """Derivatives of a reading of this static solution by parameters of its scene.
-
-        A list with an array of the shape of each parameter; with the first axis of J if J is an
-        array. One linear system for all parameters; fields cost about as much as numbers.
-
-        Parameters
-        ----------
-        J
-            The name of a sensor of the scene, a :class:`~skfem_ancf.dynamics.sensors.Sensor`, or a
-            function of the State that returns a number or an array; see
-            :class:`~skfem_ancf.Design`. A function is also called with states of changed beams: it
-            names these by number or name.
-        wrt
-            Parameters as ``(object, name)``: a beam, material, rigid body or item of the scene, and
-            an argument of it that is a number or an array. Beams have the arguments of their
-            material and mesh, too. ``(beam, "height", "nodes")`` and ``(beam, "height",
-            "elements")`` are fields; "E" and "width" may be fields as well.
-
-        Examples
-        --------
-        The deflection of a cantilever is 4 F L^3 / (E b h^3):
-
-        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
-        >>> beam = Beam(MeshBeam.init_line([0, 1], 0.01), ElementBeamCable(5),
-        ...             StVenantKirchhoff(2e8, 0.3), width=0.01)
-        >>> scene = Scene(beam).clamp("left").sensor("tip", "displacement", at=(1, 0))
-        >>> state = scene.point_force((0, -1e-4), at=(1, 0)).solve_static()
-        >>> by_h, by_E = state.gradient("tip", [(beam, "height"), (beam, "E")])
-        >>> w = state.displacement((1, 0))[1]
-        >>> round(float(by_h[1] * 0.01 / w), 3), round(float(by_E[1] * 2e8 / w), 3)
-        (-3.0, -1.0)
-        """
-        return self._derivatives(wrt, [J]).of_readings()
-
-    def sensitivity(self, wrt: Sequence[Any]) -> list[Array]:
-        """Derivatives of all displacements of this static solution by few parameters: a list of
-        arrays (N, ...) with the axes of each parameter.
-
-        Parameters
-        ----------
-        wrt
-            As for :meth:`gradient`.
-        """
-        return self._derivatives(wrt).of_displacements()
-
-    def _derivatives(self, wrt, readings=()):
-        refuse(self.system.derivatives is None, "this state does not know its scene, as after a "
-               "pickle: solve it again, or use a skfem_ancf.Design")
-        return self.system.derivatives(self, wrt, readings)
-
-
 class SpringForces:
     """The method of states and histories for forces in springs."""
 
@@ -223,7 +166,7 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
+class State(Immutable, MaterialPoints, SpringForces, Output):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters
@@ -444,7 +387,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         InputError if several lines or beams are equally near to a point, as at a node."""
         def of(part):
             if not isinstance(part, BeamPoints):
-                return self._values(part, recover).strain
+                return self.values_of(part, recover).strain
             return part.strain(self._places, self._recovery_of(part.number) if recover else None)
 
         values = self._at_points(of, point, beam, recover, line)
@@ -455,7 +398,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n)."""
-        return self._at_points(lambda part: self._values(part, recover).S, point, beam, recover,
+        return self._at_points(lambda part: self.values_of(part, recover).S, point, beam, recover,
                                line)
 
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
@@ -473,7 +416,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         300.0
         """
         found = find_field(field)
-        return self._at_points(lambda part: found.of(self._values(part, recover)), point, beam,
+        return self._at_points(lambda part: found.of(self.values_of(part, recover)), point, beam,
                                recover, line)
 
     def _at_points(self, of, point, beam, recover, line):
@@ -482,17 +425,12 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         at = self.system.points.find(point, beam, line, ask=True)
         return at.gather([of(part) for part in at.parts])
 
-    def _values(self, part, recover):
-        """Fields at points of a member, for DOFs of the scene."""
+    def values_of(self, part: Any, recover: bool = True) -> Values:
+        """All fields at points of a member, for pictures and files, too."""
         if isinstance(part, DomainPoints):
             return DomainValues(part.body, part.start, *part.fields(self._places))
         return Values(part, self._places, partial(self._recovery_of, part.number) if recover else
                       None, self._eigenstrains(part.beam), self._with_history(part.beam))
-
-    def values_of(self, beam: Beam, part: BeamPoints, recover: bool = True) -> Values:
-        """All fields at points ``part`` of one of the beams, for pictures and files."""
-        return Values(part, self._places_of(beam), partial(self.recovery, beam) if recover else
-                      None, self._eigenstrains(beam), self._with_history(beam))
 
     def _with_history(self, beam):
         return (self.base or self)._equations.histories.beam(beam)
@@ -500,6 +438,59 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     def _eigenstrains(self, beam):
         return [(self._unit * self.load * load.factor(self.t), load) for load in self.system.loads
                 if isinstance(load, EigenStrain) and load.beam is beam]
+
+    # derivatives of static solutions by parameters
+
+    def gradient(self, J: Any, wrt: Sequence[Any]) -> list[Array]:
+        """Derivatives of a reading of this static solution by parameters of its scene.
+
+        A list with an array of the shape of each parameter; with the first axis of J if J is an
+        array. One linear system for all parameters; fields cost about as much as numbers.
+
+        Parameters
+        ----------
+        J
+            The name of a sensor of the scene, a :class:`~skfem_ancf.dynamics.sensors.Sensor`, or a
+            function of the State that returns a number or an array; see
+            :class:`~skfem_ancf.Design`. A function is also called with states of changed beams: it
+            names these by number or name.
+        wrt
+            Parameters as ``(object, name)``: a beam, material, rigid body or item of the scene, and
+            an argument of it that is a number or an array. Beams have the arguments of their
+            material and mesh, too. ``(beam, "height", "nodes")`` and ``(beam, "height",
+            "elements")`` are fields; "E" and "width" may be fields as well.
+
+        Examples
+        --------
+        The deflection of a cantilever is 4 F L^3 / (E b h^3):
+
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 1], 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3), width=0.01)
+        >>> scene = Scene(beam).clamp("left").sensor("tip", "displacement", at=(1, 0))
+        >>> state = scene.point_force((0, -1e-4), at=(1, 0)).solve_static()
+        >>> by_h, by_E = state.gradient("tip", [(beam, "height"), (beam, "E")])
+        >>> w = state.displacement((1, 0))[1]
+        >>> round(float(by_h[1] * 0.01 / w), 3), round(float(by_E[1] * 2e8 / w), 3)
+        (-3.0, -1.0)
+        """
+        return self._derivatives(wrt, [J]).of_readings()
+
+    def sensitivity(self, wrt: Sequence[Any]) -> list[Array]:
+        """Derivatives of all displacements of this static solution by few parameters: a list of
+        arrays (N, ...) with the axes of each parameter.
+
+        Parameters
+        ----------
+        wrt
+            As for :meth:`gradient`.
+        """
+        return self._derivatives(wrt).of_displacements()
+
+    def _derivatives(self, wrt, readings=()):
+        refuse(self.system.derivatives is None, "this state does not know its scene, as after a "
+               "pickle: solve it again, or use a skfem_ancf.Design")
+        return self.system.derivatives(self, wrt, readings)
 
     # recovered fields
 
@@ -609,11 +600,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         """Findings about beams of an equilibrium whose recovery failed."""
         if not self.converged or self.t is not None or self.base is not None:
             return []
-        for k in range(len(self.beams)):
-            self._recovery_of(k)
         return [f"strain and stress{'' if beam.name is None else f' of beam {beam.name!r}'} are "
-                f"those of the elements, recovery failed: {self._recoveries[k].why}"
-                for k, beam in enumerate(self.beams) if self._recoveries[k].failed]
+                f"those of the elements, recovery failed: {why}" for k, (beam, why) in enumerate(
+                    zip(self.beams, self.recovered.values())) if self._recoveries[k].failed]
 
     @cached_property
     def _recoveries(self):
