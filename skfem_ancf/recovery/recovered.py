@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from functools import partial, wraps
+from functools import wraps
 from itertools import pairwise
 from typing import Any
 
@@ -34,7 +34,7 @@ from scipy.linalg.lapack import dgttrf, dgttrs, dpttrf, dpttrs
 from ..beam.distribution import AXIS, SNAP
 from ..beam import remembers
 from ..beam.strains import on_grid, stress_at
-from ..core import Array, Law, angle_of, cached_property, first_order, largest, unwrapped
+from ..core import Array, angle_of, cached_property, first_order, largest, unwrapped
 from ..formulations import EnhancedContinuum
 from ..materials import LinearLaw
 from ..mesh.mapping import cross
@@ -60,6 +60,9 @@ EACH = (-2, -1)
 #: Fraction of an element next to a load or joint that has no sections. If it is the whole segment,
 #: the sections are those of the whole element.
 CLOSE = 0.02
+
+#: Tolerance of the stress for which a strain is sought.
+BALANCED = 1e-10
 
 #: Iterations of the balance of a section in a round, and after the last one.
 BALANCE, BALANCE_AT_END = 2, 10
@@ -448,32 +451,6 @@ def _turned(f, angle):
     return np.array([c * f[0] + s * f[1], c * f[1] - s * f[0]])
 
 
-def strain_of_stress(law: Law, stress: Array, strain: Array,
-                     unknown: tuple[int, ...] = (0, 1, 2),
-                     tol: float = 1e-10) -> Array:
-    """The strain (3, ...) with a given stress under a law, by its ``unknown`` components."""
-    if isinstance(law, LinearLaw):
-        gap, some = stress - law.stress(strain), slice(unknown[0], unknown[-1] + 1)
-        strain, C = strain.astype(gap.dtype), law.compliance(unknown)
-        strain[some] += (C @ gap[some].reshape(C.shape[1], -1)).reshape(gap[some].shape)
-        return strain
-    k = list(unknown)
-    strain = np.array(strain, dtype=np.result_type(strain, stress, float))
-    with np.errstate(all="ignore"):
-        for _ in range(30):
-            found = law.stress(strain)
-            gap = (stress - found)[k]
-            size = np.max(np.abs(gap))
-            if not np.isfinite(size):
-                break
-            if size <= tol * max(np.max(np.abs(found)), np.max(np.abs(stress))):
-                return strain
-            D = np.moveaxis(law.moduli(strain)[np.ix_(k, k)], (0, 1), (-2, -1))
-            change = np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0]
-            strain[k] += np.moveaxis(change, -1, 0)
-    raise NotFound("no strain has the stress of the section under this law")
-
-
 class Recovery:
     """The recovered fields of one beam, a :class:`Segment` between cuts; ``why`` they are not
     there."""
@@ -556,8 +533,32 @@ class Recovery:
 
     def strain_of(self, stress: Array, strain: Array, unknown: tuple[int, ...] = (0, 1, 2)
                   ) -> Array:
-        """:func:`strain_of_stress` with the law of each point, shapes (3, n, m)."""
-        return self.by_law(partial(strain_of_stress, unknown=unknown), stress, strain)
+        """The strain with a given stress under the law of each point, by its ``unknown``
+        components, shapes (3, n, m)."""
+        k = list(unknown)
+
+        def solved(law, stress, strain):
+            if isinstance(law, LinearLaw):
+                gap, some = stress - law.stress(strain), slice(k[0], k[-1] + 1)
+                strain, C = strain.astype(gap.dtype), law.compliance(unknown)
+                strain[some] += (C @ gap[some].reshape(C.shape[1], -1)).reshape(gap[some].shape)
+                return strain
+            strain = np.array(strain, dtype=np.result_type(strain, stress, float))
+            with np.errstate(all="ignore"):
+                for _ in range(30):
+                    found = law.stress(strain)
+                    gap = (stress - found)[k]
+                    size = np.max(np.abs(gap))
+                    if not np.isfinite(size):
+                        break
+                    if size <= BALANCED * max(np.max(np.abs(found)), np.max(np.abs(stress))):
+                        return strain
+                    D = np.moveaxis(law.moduli(strain)[np.ix_(k, k)], (0, 1), (-2, -1))
+                    change = np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0]
+                    strain[k] += np.moveaxis(change, -1, 0)
+            raise NotFound("no strain has the stress of the section under this law")
+
+        return self.by_law(solved, stress, strain)
 
     def by_law(self, function: Callable[..., Array], *fields: Array) -> Array:
         """``function(law, *fields)`` with the law of each point, for fields (..., n, m)."""

@@ -88,7 +88,18 @@ class LoadCases(Mapping):
                  linear: bool = True) -> None:
         require_like("scene", scene, "Scene", "solve_static", "loads")
         self.scene, self.linear = scene, linear
-        self.cases = {name: _loads_of(scene, name, add) for name, add in dict(cases).items()}
+        self.cases = {}
+        for name, add in dict(cases).items():
+            refuse(not callable(add), "load case {!r} must be a function that adds loads to a "
+                   "scene, as lambda scene: scene.line_load((0, -1e3)), got {!r}", name, add)
+            other = copy(scene)
+            add(other)
+            self.cases[name] = entries = other._entries[len(scene._entries):]
+            extra = [one for entry in entries for one in entry.bound if not isinstance(one, Load)]
+            if extra or not entries or other._fixed != scene._fixed:
+                raise InputError(f"load case {name!r} must add loads, " + (
+                    f"and adds {extra[0]!r}" if extra else "and adds none") + ": supports, joints "
+                    "and springs belong to the scene")
         if combinations is None:
             combinations = {name: {name: 1.0} for name in self.cases}
         self.combinations = {}
@@ -207,18 +218,3 @@ class LoadCases(Mapping):
     def __repr__(self) -> str:
         return (f"<LoadCases {', '.join(self.cases)} in {len(self)} combinations, "
                 f"{'linear' if self.linear else 'nonlinear'}>")
-
-
-def _loads_of(scene, name, add):
-    """The entries that a function adds to a copy of a scene; only loads."""
-    refuse(not callable(add), "load case {!r} must be a function that adds loads to a scene, as "
-           "lambda scene: scene.line_load((0, -1e3)), got {!r}", name, add)
-    other = copy(scene)
-    add(other)
-    entries = other._entries[len(scene._entries):]
-    extra = [one for entry in entries for one in entry.bound if not isinstance(one, Load)]
-    if extra or not entries or other._fixed != scene._fixed:
-        raise InputError(f"load case {name!r} must add loads, " + (
-            f"and adds {extra[0]!r}" if extra else "and adds none") + ": supports, joints and "
-            "springs belong to the scene")
-    return entries

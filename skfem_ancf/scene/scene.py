@@ -36,7 +36,7 @@ from ..results.state import State
 from ..solvers import continuation, eigen, newton
 from ..solvers.continuation import Point
 from ..visuals.matplotlib import plot_scene
-from ..visuals.pyvista import Explorer, explorer
+from ..visuals.pyvista import Explorer
 from .control import Held, LinearModel, Stepper
 from .design import Gradient
 from .model import Entry, Model
@@ -394,12 +394,20 @@ class Scene(Model):
 
         dragged = isinstance(load, PointForce)
         at = (load.at, load.beam) if isinstance(load, PointForce) else ()
-        picture = dict(field=field, limits=limits, thickness=thickness, off_screen=off_screen,
-                       window_size=window_size)
+        picture: dict[str, Any] = dict(field=field, limits=limits, thickness=thickness,
+                                       off_screen=off_screen, window_size=window_size)
         if isinstance(load, PointForce):
-            return explorer(solve, None, load.total, "", lambda state: state.position(*at), picture)
+            made = Explorer(solve, [require_finite("the force", load.total, (2,))], **picture)
+            made.arrow(lambda state: state.position(*at))
+            return made
         require_function("load", load, "of a number that returns an item or a scene")
-        return explorer(solve, interval, value, title, None, picture)
+        low, high = require_finite("interval", interval, (2,))
+        value = high if value is None else require_finite_scalar("value", value)
+        refuse(not low <= value <= high or low == high, "interval must be two numbers that grow, "
+               "with value between, got {!r} and {:g}", interval, value)
+        made = Explorer(solve, [low, high, value], **picture)
+        made.slider(low, high, title)
+        return made
 
     def state(self, u: ArrayLike | None = None, multipliers: ArrayLike | None = None,
               load: float = 1.0) -> State:

@@ -12,8 +12,8 @@ import numpy as np
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.outlines import around, outlines
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, StrPath, SupportError, refuse,
-                    require_finite, require_finite_scalar, require_flag, require_index,
-                    require_like, require_module, require_path, require_text, shown)
+                    require_flag, require_index, require_like, require_module, require_path,
+                    require_text, shown)
 from ..core.archive import output_file
 from ..recovery.fields import FIELDS, find_fields
 from ..recovery.grids import CELL_TYPES, COMPONENTS, body_of, facts_of, grids, in_space
@@ -388,22 +388,3 @@ class Explorer:
         draw()
         look(self.plotter, self._low, self._high, MARGIN + ARROW)
         self.plotter.add_mesh(drawn, color=LOAD, lighting=False)
-
-
-def explorer(solve: Callable[[Any, Any], Any], interval: Any, value: Any, title: str,
-             place: Callable[[Any], Array] | None, picture: dict[str, Any]) -> Explorer:
-    """An Explorer with its slider, or with its arrow if a place is given."""
-    # ``solve`` and ``picture`` are for :class:`Explorer`, ``place`` for :meth:`Explorer.arrow`;
-    # ``interval, value, title`` are ends, start and title of the slider, or ``value`` is the
-    # initial force (2,).
-    if place is not None:
-        made = Explorer(solve, [require_finite("the force", value, (2,))], **picture)
-        made.arrow(place)
-        return made
-    low, high = require_finite("interval", interval, (2,))
-    value = high if value is None else require_finite_scalar("value", value)
-    refuse(not low <= value <= high or low == high, "interval must be two numbers that grow, with "
-           "value between, got {!r} and {:g}", interval, value)
-    made = Explorer(solve, [low, high, value], **picture)
-    made.slider(low, high, title)
-    return made
