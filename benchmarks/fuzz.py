@@ -706,7 +706,7 @@ def verdict_of(system, state, K, scale):
     A = d[:, None] * K[np.ix_(free, free)] * d
     symmetric = np.abs(A - A.T).max(initial=0.0) < 1e-8 * np.abs(A).max(initial=1.0)
     if system.constraints.m:
-        Z = null_space(system.constraints.jacobian(state.u, time_of(state))[:, free] * d)
+        Z = null_space(system.constraints.full_jacobian(state.u, time_of(state))[:, free] * d)
         A = Z.T @ A @ Z
     values = np.linalg.eigvalsh(0.5 * (A + A.T))
     # the diagonal is 1; bending of a slender beam is small beside it

@@ -50,7 +50,7 @@ def dense_eigenvalues(system, u, multipliers=None):
     system.assemble(u)
     K = (system.K.tocsc() + system.constraints.curvature(u, 0.0, multipliers)).toarray()
     free = np.nonzero(system.constraints.free)[0]
-    A, J = K[np.ix_(free, free)], dense(system.constraints.jacobian(u, 0.0))[:, free]
+    A, J = K[np.ix_(free, free)], dense(system.constraints.full_jacobian(u, 0.0))[:, free]
     if len(J):
         Z = scipy.linalg.null_space(J / np.linalg.norm(J, axis=1)[:, None])
         A = Z.T @ A @ Z

@@ -341,10 +341,7 @@ def multiply(A, x, y):
     elif n > 2 * k:
         y[:] = blas.dgbmv(n, n, k, k, 1.0, ab[k:], x)
     else:  # not supported by scipy's wrapper
-        y[:] = ab[A.top] * x
-        for d in range(1, min(k, n - 1) + 1):
-            y[d:] += ab[A.top + d, :n - d] * x[:n - d]
-            y[:n - d] += ab[A.top - d, d:] * x[d:]
+        y[:] = BandMatrix(*A[:5]).toarray() @ x
 
 
 @primitive("skfem_ancf.core.loops")
@@ -367,32 +364,31 @@ def factorize(A):
         return bool(info == 0 and np.all(np.isfinite(ab[A.top])))
     c, info = lapack.dpbtrf(ab, lower=1)
     if info != 0:
-        return _eliminate(A)
+        return _eliminate(ab.T, LOST)
     before, ab[0] = ab[0].copy(), c[0] ** 2
     ab[1:] = c[1:] / c[0]
     return bool(np.all(ab[0] >= LOST * before))
 
 
-def _eliminate(A):
-    """L D L^T of an indefinite symmetric matrix."""
+def _eliminate(columns, lost):
+    """L D L^T without pivots of a symmetric band, columns (n, width + 1); False if one is lost."""
     # Entries of a row are ld - 1 apart, so that the next columns form a strided square, whose upper
     # triangle belongs to other entries.
-    columns = as_lapack(A).T
-    n, stride = len(columns), columns.itemsize
-    lower = np.tri(min(A.width, n - 1)).T  # rows are columns
+    (n, k), stride = columns.shape, columns.itemsize
+    lower = np.tri(k - 1).T  # rows are columns
     for j in range(n):
-        m, d = min(A.width, n - 1 - j), columns[j, 0]
-        if not abs(d) > 0.0:
+        m, d = min(k - 1, n - 1 - j), columns[j, 0]
+        if not 0.0 < abs(d) < np.inf:
             return False
         if m:
             diagonal, below = columns[j + 1:j + 1 + m, 0], columns[j, 1:m + 1]
             before = np.abs(diagonal)
-            left = as_strided(columns[j + 1:], (m, m), (stride * (A.ld - 1), stride))
+            left = as_strided(columns[j + 1:], (m, m), (columns.strides[0] - stride, stride))
             left -= lower[:m, :m] * (below / d)[:, None] * below
-            if (np.abs(diagonal) < LOST * before).any():
+            if (np.abs(diagonal) < lost * before).any():
                 return False
             below /= d
-    return bool(np.all(np.isfinite(columns[:, 0])))
+    return True
 
 
 @primitive("skfem_ancf.core.loops")
@@ -477,19 +473,10 @@ def factorize_complex(A, width):
     """L D L^T of a complex symmetric band in place; False if it fails."""
     # A has real parts, then imaginary parts, each as in a symmetric :class:`Band` of half bandwidth
     # ``width``.
-    ld = width + 1 + SPARE
-    n, flat = A.size // (2 * ld), np.append(_complex(A), np.zeros((width + 1) * ld))
-    for j in range(n):
-        column = flat[j * ld:j * ld + width + 1]
-        d = column[0]
-        if not 0.0 < abs(d) < np.inf:
-            return False
-        below = column[1:].copy()
-        column[1:] /= d
-        later = np.lib.stride_tricks.as_strided(flat[(j + 1) * ld:], (width, width), (
-            (ld - 1) * flat.itemsize, flat.itemsize))
-        later -= np.triu(np.outer(column[1:], below))  # entries (i, k) of column j + 1 + k
-    A[:A.size // 2], A[A.size // 2:] = flat[:n * ld].real, flat[:n * ld].imag
+    both = _complex(A).reshape(-1, width + 1 + SPARE)
+    if not _eliminate(both[:, :width + 1], 0.0):
+        return False
+    A[:A.size // 2], A[A.size // 2:] = both.real.ravel(), both.imag.ravel()
     return True
 
 

@@ -14,6 +14,7 @@ from ..actions.bound import BoundConstraint, everywhere, is_table
 from ..actions.joints.base import IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam import Beam, RigidBody
+from ..core.band import dense
 from ..core import Array, InputError, ModelWarning, SupportError, cached_property, is_builtin, shown
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
 from .signature import DENSE, FREE, first_dependent
@@ -180,18 +181,6 @@ class Constraints:
         return (offset + np.bincount(rows, values * u[columns], self.m)
                 + 0.5 * np.bincount(k, v * u[i] * u[j], self.m))
 
-    def add_moving(self, slopes: bool, u: Array, v: Array, t: float, out: Array) -> None:
-        """Add Phi, or with ``slopes`` J v, of joints that depend on time to ``out`` (m,)."""
-        first = 0
-        for joint in self.joints:
-            part = out[first:first + len(joint.equations)]
-            first += len(part)
-            if joint.moving and slopes:
-                rows, columns, values = joint.entries(u, t)
-                part += np.bincount(rows, values * v[columns], len(part))
-            elif joint.moving:
-                part += joint.value(u, t)
-
     @cached_property
     def seconds(self) -> tuple[Array, ...]:
         """Second derivatives of Phi in the reference configuration: equation, i, j, value."""
@@ -255,7 +244,7 @@ class Constraints:
         return self._to_sparse(*self._entries(u, t))
 
     def jacobian_entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """Entries of :meth:`jacobian`; duplicates are summed."""
+        """Entries of J, zero at fixed DOFs; duplicates are summed."""
         rows, columns, values = self._entries(u, t)
         return rows, columns, values * self.mask[columns]
 
@@ -287,13 +276,37 @@ class Constraints:
             first += len(joint.equations)
         return _joined(parts or [_NO_ENTRIES])
 
-    def jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
-        """:meth:`full_jacobian` with zero columns at fixed DOFs."""
-        return (self.to_dense if self.few else self._to_sparse)(*self.jacobian_entries(u, t))
-
-    def quadratic(self, u: Array, t: float, v: Array) -> Array:
-        """v^T Phi'' v, shape (m,)."""
-        return np.concatenate([np.zeros(0), *(joint.quadratic(u, t, v) for joint in self.joints)])
+    def add_custom_joints(self, what: int, t: float, u: Array, v: Array, out: Array) -> None:
+        """Evaluate joints without tables for kernels; results are added to ``out``."""
+        # ``what`` is 0: Phi, 1: J v, 2: J^T v with v (m,), 3: J, 4: v^T Phi'' v. For the
+        # energy-momentum scheme, 5: the discrete gradient from v to u, 6: the force of impulses,
+        # with u at the end of the step and v = (v0, v1, u0, impulses). 7 and 8 are 0 and 1 of the
+        # joints that depend on time, with zeros for the others.
+        N, first = self.N, 0
+        if what == 0:
+            out[:] = self.constraint(u, t)
+        elif what == 1:
+            out += self.full_jacobian(u, t) @ v
+        elif what == 2:
+            out += v @ self.full_jacobian(u, t)
+        elif what == 3:
+            out += dense(self.full_jacobian(u, t)).ravel()
+        elif what == 5:
+            out += self.to_dense(*self._in_order(
+                joint.mean_entries(v, u, t) for joint in self.joints)).ravel()
+        elif what == 6:
+            v0, v1, u0 = v[:3 * N].reshape(3, N)
+            out += self.mean_turning(u0, u, v0, v1, t, v[3 * N:])
+        for joint in self.joints if what in (4, 7, 8) else ():
+            part = out[first:first + len(joint.equations)]
+            first += len(part)
+            if what == 4:
+                part += joint.quadratic(u, t, v)
+            elif joint.moving and what == 7:
+                part += joint.value(u, t)
+            elif joint.moving:
+                rows, columns, values = joint.entries(u, t)
+                part += np.bincount(rows, values * v[columns], len(part))
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> sparse.csr_matrix:
         """sum_k multipliers[k] d^2 Phi_k / du^2 between free DOFs, sparse (N, N)."""
@@ -303,21 +316,14 @@ class Constraints:
     def curvature_entries(self, u: Array, t: float | None,
                           multipliers: Array) -> tuple[Array, Array, Array]:
         """Entries of :meth:`curvature`."""
-        i, j, v = self._curvature(u, t, multipliers)
-        return i, j, v * (self.free[i] & self.free[j])
-
-    def _curvature(self, u, t, multipliers):
         if self.tabled:
             k, i, j, v = self.seconds
-            return i, j, multipliers[k] * v
-        parts = [joint.curvature(u, t, part)
-                 for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
-        return _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
-
-    def mean_jacobian(self, u0: Array, u1: Array, t: float) -> Array:
-        """Discrete gradients of Phi from u0 to u1, shape (m, N)."""
-        return self.to_dense(*self._in_order(
-            joint.mean_entries(u0, u1, t) for joint in self.joints))
+            v = multipliers[k] * v
+        else:
+            parts = [joint.curvature(u, t, part)
+                     for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
+            i, j, v = _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
+        return i, j, v * (self.free[i] & self.free[j])
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
@@ -367,26 +373,29 @@ class Constraints:
             inner = [isinstance(j, UnitDirector) for j in whole.joints for _ in j.equations]
             multipliers = shared(rows, sizes * all_of, self._left_out, np.array(inner)) / sizes
             return whole.joint_force(joint, multipliers, reaction, u, t)
-        for known, part in zip(self.joints, self.multipliers_of(multipliers)):
-            if known.same(joint):
-                return -part
-        for known, first, factors in self._fixing:
-            if known.same(joint):
-                return reaction[self.fixed[first:first + len(factors)]] / factors
-        raise SupportError(f"{shown(joint)} is not a joint of this scene")
+        rows, dofs, factors = self._places(joint)
+        return reaction[dofs] / factors if rows is None else -multipliers[rows]
 
     def driven(self, joint: BoundConstraint, change: Array) -> tuple[Array, Array]:
         """Changes of J u (m,) and of fixed displacements (N,) for a change of Phi of a joint."""
-        rows, fixed, at = np.zeros(self.m), np.zeros(self.N), 0
+        of_rows, fixed, (rows, dofs, factors) = (
+            np.zeros(self.m), np.zeros(self.N), self._places(joint))
+        if rows is None:
+            fixed[dofs] = -change / factors
+        else:
+            of_rows[rows] = -change
+        return of_rows, fixed
+
+    def _places(self, joint):
+        """Rows of the equations of a joint, or None, the DOFs that it fixes, and their factors."""
+        end = 0
         for known in self.joints:
+            first, end = end, end + len(known.equations)
             if known.same(joint):
-                rows[at:at + len(change)] = -change
-                return rows, fixed
-            at += len(known.equations)
+                return slice(first, end), None, None
         for known, first, factors in self._fixing:
             if known.same(joint):
-                fixed[self.fixed[first:first + len(factors)]] = -change / factors
-                return rows, fixed
+                return None, self.fixed[first:first + len(factors)], factors
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
     def force_on(self, selected: Array, multipliers: Array, rest: Array) -> tuple[Array, Array]:

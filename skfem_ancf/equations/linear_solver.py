@@ -33,7 +33,7 @@ ROUGH = 1e-8
 class Last:
     """The last factors of a matrix that is more than a band."""
 
-    joined: Alone | Schur | NullSpace | None = None
+    factors: Alone | Schur | NullSpace | None = None
 
 
 class LinearSolver:
@@ -49,6 +49,8 @@ class LinearSolver:
         self.coupled = bool(system.constraints.joints) or system.forces.couples_far
         #: True if it is only while changing elements do something.
         self.at_times = not (system.constraints.joints or system.forces.distant)
+        if not self.coupled:
+            self.keep_band()
 
     def after(self, system: Any) -> LinearSolver:
         """A copy for a system with another history; matrices and factors are shared."""
@@ -117,29 +119,30 @@ class LinearSolver:
         inside = np.abs(more[0] - more[1]) <= s.K.width
         s.K.add(*(x[inside] for x in more))
         more = tuple(x[~inside] for x in more)
-        self._last.joined = None
+        self._last.factors = None
         if not len(more[0]) and not constraints.m:
             s.K.factorize()
-            self._last.joined = Alone(s)
+            self.keep_band()
             return
         if s.symmetric and not len(more[0]) and constraints.few:
             try:
-                self._last.joined = Schur(s.K, J, constraints)
+                self._last.factors = Schur(s.K, J, constraints)
                 return
             except np.linalg.LinAlgError:
                 logger.debug("the band is not definite without the joints")
-        self._last.joined = NullSpace(s.K, J, more, constraints, self._pattern)
+        self._last.factors = NullSpace(s.K, J, more, constraints, self._pattern)
+
+    @property
+    def _factors(self):
+        found = self._last.factors if self.condensed is None else self.condensed
+        if found is None or (found is self.condensed and not found.ready):
+            raise np.linalg.LinAlgError("there are no factors")
+        return found
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """x and multipliers for forces (N,) and constraint residuals (m,)."""
-        s = self._system
-        b, none = residual * s.constraints.mask, np.zeros(0)
-        if not self.coupled:
-            return s.K.solve(b), none
-        solver = self._last.joined if self.condensed is None else self.condensed
-        if solver is None or (solver is self.condensed and not solver.ready):
-            raise np.linalg.LinAlgError("there are no factors")
-        return solver.solve(b, none if phi is None else phi)
+        return self._factors.solve(residual * self._system.constraints.mask,
+                                   np.zeros(0) if phi is None else phi)
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                    dm: Array) -> bool:
@@ -148,7 +151,7 @@ class LinearSolver:
             self.factorize(u, t, multipliers)
             if self.coupled:
                 du[:], dm[:] = self.solve(R, phi)
-            else:
+            else:  # without detours
                 du[:] = self._system.K.solve(R)
         except NO_FACTORS as error:
             logger.debug("no factors: %s", error)
@@ -172,31 +175,25 @@ class LinearSolver:
         >>> system.solver.inertia()
         Inertia(negative=1, singular=False)
         """
-        K = self._system.K
-        if not self.coupled:
-            return (K if self._system.symmetric else K.symmetric_part()).inertia()
-        solver = self._last.joined if self.condensed is None else self.condensed
-        assert solver is not None
-        return solver.inertia()
+        return self._factors.inertia()
 
     def determinant_sign(self) -> int:
         """Sign of the determinant of the matrix of :meth:`inertia`, but of the unsymmetric one."""
-        if not self.coupled:
-            return self._system.K.determinant_sign()
-        if isinstance(self._last.joined, NullSpace):
-            return determinant_sign(self._last.joined.reduced())
-        if isinstance(self._last.joined, Alone):
+        if isinstance(self._last.factors, NullSpace):
+            return determinant_sign(self._last.factors.reduced())
+        if isinstance(self._last.factors, Alone):
             return self._system.K.determinant_sign()
         return -1 if self.inertia().negative % 2 else 1
 
     def keep_band(self) -> None:
         """Take the factors of the band for those of the whole."""
-        self._last.joined = Alone(self._system)
+        self._last.factors = Alone(self._system)
 
     def forget(self) -> None:
         """Discard all factors."""
         self._system.K.clear()
-        self._last.joined = None
+        if self.coupled:
+            self._last.factors = None
         if self.condensed is not None:
             self.condensed.forget()
 
@@ -204,7 +201,7 @@ class LinearSolver:
         """True if the last factors of an iteration show a definite tangent."""
         if not self.coupled:
             return self._system.K.definite
-        known = self._last.joined if self.condensed is None else self.condensed.ready
+        known = self._last.factors if self.condensed is None else self.condensed.ready
         return bool(known) and self._system.symmetric and self.inertia() == Inertia(0, False)
 
 

@@ -65,7 +65,7 @@ class MassSolver:
         free = constraints.free
         if not constraints.m:
             return lambda b, rate: (M.solve(b * free), np.zeros(0))
-        J = J * free if isinstance(J, np.ndarray) else dense(constraints.jacobian(u, t))
+        J = dense(constraints.full_jacobian(u, t) if J is None else J) * free
         Y = M.solve(J.T)
         S = J @ Y
 

@@ -64,9 +64,7 @@ def _stiffness_times(system, base, d, load):
         K, u = k.tangents(base[s]), k.gather(d[s])
         out[s] = k.scatter(np.einsum("eij,ej->ei", K, u.reshape(len(K), -1)).reshape(u.shape))
     if system.forces.elements:
-        i, j, v = system.forces.entries(system.backend.tables.plain.forces, load, base, 0.0 * base,
-                                        0.0)
-        np.add.at(out, i, v * d[j])
+        out += system.element_stiffness(base, load) @ d
     return out
 
 

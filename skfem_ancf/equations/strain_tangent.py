@@ -55,20 +55,14 @@ class StrainTangent:
         self.stress = np.concatenate([part[2] for part in parts])
         #: first stress of each beam but the first one
         self._first = np.cumsum([len(part[2]) for part in parts[:len(system.beams)]])[:-1]
-        self.J = sparse.csr_matrix(system.constraints.jacobian(u, self._at[-1])[:, self.free])
+        J = system.constraints.sparse_jacobian(u, self._at[-1])
+        self.J = sparse.csr_matrix(J[:, self.free])
         self._set_stress(self.stress, multipliers)
 
     def _set_stress(self, stress, multipliers):
         self.stress, self.multipliers = stress, multipliers
-        self.S = self.geometric(stress, multipliers, self._at[1]) + self._elements()
-
-    def _elements(self):
-        """The derivative of the force elements at free DOFs."""
-        u, system = self._at[0], self.system
-        i, j, v = system.forces.entries(system.backend.tables.plain.forces, self._at[3], u, 0.0 * u,
-                                        0.0)
-        K = sparse.csr_matrix((v, (i, j)), shape=(system.N, system.N))
-        return K[self.free][:, self.free]
+        K = csr_matrix(self.system.element_stiffness(self._at[0], self._at[3]))
+        self.S = self.geometric(stress, multipliers, self._at[1]) + K[self.free][:, self.free]
 
     def _element_force(self):
         system, force = self.system, np.zeros(self.system.N)

@@ -56,7 +56,7 @@ class Scales:
         s = self._system
         if s.beams or s.domains:
             return 0.0
-        springs = abs(s.stiffness_at_rest())
+        springs = abs(s.element_stiffness())
         force = np.max(np.abs(s.external_force(np.zeros(s.N))))
         stiffness = springs.max() if springs.nnz else 0.0
         return float(stiffness * s.size**2 + force * s.size) or 1.0
@@ -354,15 +354,16 @@ class System:
         """True if the axis folds back within an element."""
         return any(bent(beam, u[s])[1] for beam, s in zip(self.beams, self.slices))
 
-    def stiffness_at_rest(self) -> sparse.csr_array:
-        """The stiffness of force elements in the reference configuration, shape (N, N)."""
-        zero = np.zeros(self.N)
-        i, j, v = self.forces.entries(self.backend.tables.plain.forces, 0.0, zero, zero, 0.0)
+    def element_stiffness(self, u: Array | None = None, at: float = 0.0) -> sparse.csr_array:
+        """The stiffness of force elements, shape (N, N), by default in the reference configuration.
+        ``at`` is the time, or the load factor in statics."""
+        u = np.zeros(self.N) if u is None else u
+        i, j, v = self.forces.entries(self.backend.tables.plain.forces, at, u, 0.0 * u, 0.0)
         return sparse.csr_array((v, (i, j)), shape=(self.N, self.N))
 
     def _holding(self):
         """Stiffness that may constrain rigid motions: of force elements and user-defined loads."""
-        K = self.stiffness_at_rest()
+        K = self.element_stiffness()
         for load in filter(_holds, self.loads):
             first, (i, j, v) = self.of(load).start, load.stiffness(np.zeros(load.beam.N))
             K = K - sparse.csr_array((v, (first + i, first + j)), shape=K.shape)

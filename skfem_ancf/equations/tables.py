@@ -7,7 +7,7 @@ from weakref import proxy, ref
 
 import numpy as np
 
-from ..core.band import Band, dense
+from ..core.band import Band
 from ..core import F1, F2, I1, I2, Array, cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
@@ -67,8 +67,8 @@ class UserDefined:
     (N,). Force elements are called through ``forces``."""
 
     def __init__(self, system: Any, loads: Sequence[Load]) -> None:
-        self._system = proxy(system)
-        self.forces, self._loads = system.forces, list(loads)
+        self._system, self.forces, self._loads = proxy(system), system.forces, list(loads)
+        self.add_custom_joints = system.constraints.add_custom_joints
 
     def add_custom_force(self, t: float, scale: float, u: Array, out: Array) -> None:
         """Add the force of the loads."""
@@ -98,31 +98,6 @@ class UserDefined:
             keep = np.full(len(v), not system.symmetric) | (i >= j)
             at = system.K.position(first + i, first + j)
             np.add.at(flat, at[keep], -scale * factor * v[keep])
-
-    def add_custom_joints(self, what: int, t: float, u: Array, v: Array, out: Array) -> None:
-        """Evaluate joints."""
-        # ``what`` is 0: Phi, 1: J v, 2: J^T v with v (m,), 3: J, 4: v^T Phi'' v. For the
-        # energy-momentum scheme, 5: the discrete gradient from v to u, 6: the force of impulses,
-        # with u at the end of the step and v = (v0, v1, u0, impulses). 7 and 8 are 0 and 1 of the
-        # joints that depend on time, with zeros for the others.
-        c, N = self._system.constraints, self._system.N
-        if what == 0:
-            out[:] = c.constraint(u, t)
-        elif what == 1:
-            out += c.full_jacobian(u, t) @ v
-        elif what == 2:
-            out += v @ c.full_jacobian(u, t)
-        elif what == 3:
-            out += dense(c.full_jacobian(u, t)).ravel()
-        elif what == 4:
-            out += c.quadratic(u, t, v)
-        elif what == 5:
-            out += c.mean_jacobian(v, u, t).ravel()
-        elif what >= 7:
-            c.add_moving(what == 8, u, v, t, out)
-        else:
-            v0, v1, u0 = v[:3 * N].reshape(3, N)
-            out += c.mean_turning(u0, u, v0, v1, t, v[3 * N:])
 
 
 class Tables:

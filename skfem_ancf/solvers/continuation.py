@@ -295,7 +295,7 @@ class Tracer:
                 raise LoadStepFailed("the strain is not finite")
             residual, phi = load * external - force, system.constraints.constraint(u, load)
             if system.constraints.joints:
-                residual = residual - m @ system.constraints.jacobian(u, load)
+                residual = residual - m @ system.constraints.full_jacobian(u, load)
             reference = np.sqrt(max(abs(force @ u), abs(load * (external @ u)),
                                     abs(external @ step * dl)))
             contraction = work / before if 0.0 < work < before else 1.0

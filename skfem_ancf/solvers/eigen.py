@@ -310,15 +310,16 @@ def _prestressed(system):
     if not len(system.forces.elements):
         return None
     push = np.abs(system.internal_force(zero, 0.0, 0.0) * c.mask).max()
-    springs = abs(system.stiffness_at_rest())
+    springs = abs(system.element_stiffness())
     if push <= UNSTRESSED * (springs.max() if springs.nnz else 0.0) * system.size:
         return None
     refuse(c.moves or c.drives, "springs or energies push before there is any load, and supports "
            "move: buckling() starts from the equilibrium without loads, and knows one of them. Use "
            "state.stability of scene.solve_static(stable=False), or scene.modes(k, state)")
-    search = Search(system, None, None, Steps("newton", 1e-8, 30, 1.0, 1e-4), True, False)
+    search = Search(system, None, None, Steps("newton", 1e-8, 30, 1.0, 1e-4), False, False)
+    search.route = Route(zero, loads=(0.0, 0.0), times=(0.0, 0.0))
     try:
-        found = search.load_steps("newton", Route(zero, loads=(0.0, 0.0), times=(0.0, 0.0)))
+        found = search.load_steps("newton")
     except LoadStepFailed as failure:
         raise InputError("no equilibrium without loads was found for what springs and energies "
                          f"push then: {failure}. Give buckling() a state") from None

@@ -18,7 +18,6 @@ from .iteration import (CONVERGED, INDEFINITE, ITERATIONS, NOT_CONVERGED, NOT_FI
                         equilibrium)
 from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                       StaticResult, Unstable)
-from .strategies import MOST_FROM_SOFT, search_contact
 
 logger = logging.getLogger(__name__)
 
@@ -27,8 +26,6 @@ AUGMENTED = 50
 #: Number of corrections after which they are too slow, and the obstacles are stiffened; by which
 #: factor, and up to which.
 SLOW, STIFFER, STIFFEST = 5, 10.0, 1e6
-#: Tolerance of an equilibrium that is only a start.
-NEAR = 1e-2
 
 
 class Route(NamedTuple):
@@ -131,7 +128,8 @@ class Increment:
         # if obstacles are stiffer than it is unstable, see Bertsekas: "Constrained Optimization and
         # Lagrange Multiplier Methods", Academic Press 1982, 2.2.
         contacts = self.system.forces.contacts
-        found = self._touching()
+        found = (strategies.ContactSearch(self).find() if contacts.obstacles else
+                 self.from_start(self.options))
         for _ in range(AUGMENTED):
             if not self.system.forces.corrected(found.u, self.time):
                 break
@@ -149,29 +147,7 @@ class Increment:
         raise LoadStepFailed("the penetration of obstacles is above its tolerance after "
                              f"{AUGMENTED} corrections of the pressure")
 
-    def _touching(self):
-        """Iterate, with obstacles by :mod:`skfem_ancf.solvers.strategies`."""
-        contacts, options = self.system.forces.contacts, self.options
-        if not contacts.obstacles:
-            return self._from_start(options)
-
-        def solve(begin, rough, most=None):
-            chosen = options._replace(most=min(options.most, most or options.most))
-            if rough:
-                chosen = options._replace(tol=max(options.tol, NEAR),
-                                          most=min(options.most, MOST_FROM_SOFT))
-            return self._from_start(chosen) if begin is None else self.iterate(begin, chosen)
-
-        before = self.start.u, options.route.load_and_time(self.start.load)[1]
-        return search_contact(contacts, before, self.time, solve,
-                              lambda u: self.system.strain_energy(u, self.time), self._response,
-                              options.close, options.drag is not None)
-
-    def _response(self, found):
-        """The response at an equilibrium."""
-        return stability.response(self.system, found.u, self.load, self.time, found.multipliers)
-
-    def _from_start(self, options):
+    def from_start(self, options: Options) -> Equilibrium:
         """Iterate from the last equilibrium; if that fails, from the equilibrium of the linearised
         law. A correction that turns a beam far strains it temporarily, possibly beyond the range of
         a nonlinear law. The equilibrium of Hooke's law is close to the final one."""
@@ -183,7 +159,7 @@ class Increment:
         except LoadStepFailed as failed:
             failure = failed
         try:
-            close = self.iterate(options=options._replace(tol=max(options.tol, NEAR)),
+            close = self.iterate(options=options._replace(tol=max(options.tol, strategies.CLOSE)),
                                  backend=backend)
             return self.iterate(close, options)
         except LoadStepFailed:

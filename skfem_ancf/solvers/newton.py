@@ -1,4 +1,4 @@
-"""Static equilibrium: a list of strategies, and load steps."""
+"""Static equilibrium: strategies, and load steps."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ logger = logging.getLogger(__name__)
 
 #: Largest number of iterations in a load step.
 MAX_ITERATIONS = 10000
-#: Number of iterations of load steps, and of cuts of the first step, before the next strategy.
-FEW, CUT = 60, 3
+#: Number of iterations of load steps, of which one fails then, before the next strategy.
+FEW = 150
 #: Largest number of iterations of all strategies for the whole load, in scenes with obstacles.
 MOST = 1000
 #: Number of unstabilised equilibria after which the search without friction ends.
@@ -131,7 +131,6 @@ class Search:
     _too_large = False
     _loose = ""  # an unstabilised motion in words
     _furthest: StaticResult | None = None
-    _other: StaticResult | None = None
     _folded: StaticResult | None = None
     _failure: Exception | None = None
     _spent, _unstabilised, _unstable = 0, 0, False
@@ -177,7 +176,8 @@ class Search:
             except LoadStepFailed as failure:
                 self._note(name, str(failure))
                 self._unstable = self._unstable or isinstance(failure, Unstable)
-                self._failure = failure
+                if name != "descent" or self._failure is None:  # that of load steps says more
+                    self._failure = failure
                 if self._exhausted or isinstance(failure, UnboundedMotion):
                     break
                 if self._unstabilised == UNSTABILISED and not self._has_friction:
@@ -187,55 +187,32 @@ class Search:
             return self._done(result)
         if self._folded is not None:
             return self._done(self._folded)
-        if self._other is not None:
-            self._other.doubt = self._other.doubt or (
-                "there may be several stable equilibria, and the loads may lead to another one")
-            return self._done(self._other)
         raise self._lost()
 
     def _strategies(self) -> Iterator[tuple[str, Callable[[], StaticResult]]]:
         """Names and functions of strategies, in order; what applies depends on those before."""
-        # Each stops after some iterations but the last, load steps as small as may be.
         rules, system, at_once = self.rules, self.system, self._at_once
         if not self._auto:
             yield METHODS[rules.method], partial(self.load_steps, rules.method)
             return
-        size = 0.25 if at_once else rules.first_step  # smaller, if the whole load has failed
-        down = "descent", self.descent
-        newton = METHODS["newton"], partial(self.one_step, "newton")
-        loads_first = "loads before supports", self._loads_first
-        moves = at_once and self.route.proportional and (
-            system.constraints.moves or system.constraints.drives)
-        # if contacts open and close, a descent needs fewer corrections than load steps
-        early = self.stabilised_by_loads or (at_once and self.touches)
-        if self.stabilised_by_loads:  # the tangent at rest is singular
-            if moves:
-                yield loads_first
-        elif at_once:
+        if at_once and not self.stabilised_by_loads:
             yield METHODS["mixed"], partial(self.one_step, "mixed")
             # The first correction of a slack rope is far too large. The stress of the strain
             # corrects that, the independent stress does not.
             if self._too_large:
-                yield newton
+                yield METHODS["newton"], partial(self.one_step, "newton")
+        # if contacts open and close, a descent needs fewer corrections than load steps; the tangent
+        # at rest is singular if only loads stabilise, and springs that push make steps no smaller
+        early = self.stabilised_by_loads or at_once and self.touches or (
+            self.route.proportional and bool(np.any(
+                system.internal_force(self.route.u, 0.0, 0.0) * system.constraints.mask)))
         if early and self.stable:
-            yield down
-        if at_once and self.stabilised_by_loads:
-            yield newton
-        prestressed = self.route.proportional and bool(np.any(
-            system.internal_force(self.route.u, 0.0, 0.0) * system.constraints.mask))
-        if not prestressed:  # by springs
-            yield "smaller load steps", partial(self.load_steps, "mixed", size=size, few=True)
-        if self.stabilised_by_loads:
-            yield "smaller load steps of Newton's method", partial(
-                self.load_steps, "newton", size=size, few=True)
-            return
-        if at_once and not self._too_large:
-            yield newton
-        if moves:
-            yield loads_first
+            yield "descent", self.descent
+        # the last one may take as many iterations as it needs
+        few = self.stabilised_by_loads or self.stable and not early
+        yield "smaller load steps", partial(self.load_steps, "mixed", few)
         if self.stable and not early:
-            yield down
-        yield "load steps as small as may be", partial(self.load_steps, "mixed")
+            yield "descent", self.descent
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
@@ -262,12 +239,12 @@ class Search:
                                            progress=False)
             except (AncfError, *NO_FACTORS):
                 critical = []
-            limits = [x.load for x in critical if x.kind == "limit" and x.load > 0.0]
-            if limits and limits[0] < 1.0:
-                result.doubt = (
-                    "the path from the reference configuration has a limit point at the load level "
-                    f"{limits[0]:.4g}; the equilibrium found lies beyond it, and need not be the "
-                    "only one")
+            for point in critical:
+                if 0.0 < point.load < 1.0 and not result.doubt:
+                    result.doubt = (
+                        f"the path from the reference configuration has a {point.kind} point at "
+                        f"the load level {point.load:.4g}; the equilibrium found lies beyond it, "
+                        "and need not be the only one")
         result.converged, result.attempts = True, tuple(self.attempts)
         result.message = (f"converged in {len(result.steps)} load steps, {result.iterations} "
                           f"iterations, by {self.attempts[-1].strategy}")
@@ -323,22 +300,15 @@ class Search:
         with np.errstate(all="ignore"):  # overflow shows in the residual
             return step.reached(step.resting() or step.iterate())
 
-    def one_step(self, method: str, route: Route | None = None) -> StaticResult:
-        """The equilibrium at the end of a route in one step."""
-        route = route or self.route
-        result = self._beginning(route)
+    def one_step(self, method: str) -> StaticResult:
+        """The equilibrium at full load in one step."""
+        route, result = self.route, self._beginning(self.route)
         options = self._options(route, method, watched=True)
         if self.touches and self.stable:  # a descent follows
             options = options._replace(most=min(MOST_FROM_SOFT, options.most))
         step = Increment(self.system, result, 1.0, options)
         try:
-            found = step.solve(self._ends_stable(route))
-            # a later strategy may find an equilibrium on the side away from the load
-            if (self.attempts and self.stable and route.proportional
-                    and not (self.stabilised_by_loads or self.touches)
-                    and not strategies.heads_on(self.system, result, found.u, 1.0)):
-                self._other = self._other or step.reached(found)
-                raise Unstable("the equilibrium found lies on the side away from the load", found)
+            found = step.solve(self.stable)
         except FirstStepTooLarge:
             self._too_large = True
             raise
@@ -346,21 +316,20 @@ class Search:
             self._spent += step.record.iterations
         return step.reached(found)
 
-    def _loads_first(self):
-        """Apply the loads with fixed supports, then move the supports."""
-        loaded = self.route._replace(times=(0.0, 0.0))
-        start = self.descent(loaded) if self.stabilised_by_loads else (
-            self.one_step("newton", loaded))
-        moved = self.route._replace(u=start.u, loads=(1.0, 1.0))
-        start.load = 0.0
-        return self.load_steps("newton", moved, start, few=True)
-
-    def descent(self, route: Route | None = None, most: int = strategies.DESCENT) -> StaticResult:
-        """The equilibrium at full load by a descent of ``most`` iterations."""
-        # It goes to a minimum of the potential, by a trust-region method.
-        route = route or self.route
-        result, options = self._beginning(route), self._options(route, "mixed")
-        step = Increment(self.system, result, 1.0, options)
+    def descent(self, most: int = strategies.DESCENT, route: Route | None = None) -> StaticResult:
+        """The equilibrium at the end of a route by descents of ``most`` iterations."""
+        # They go to minima of the potential, by a trust-region method. Loads act before supports
+        # move: a chain sags to the side of its weight before its ends approach.
+        system, constraints, before = self.system, self.system.constraints, []
+        if route is None:
+            route = self.route
+            if (route.proportional and (constraints.moves or constraints.drives)
+                    and (self.stabilised_by_loads or not self.touches)):
+                loaded = self.descent(most, route._replace(times=(0.0, 0.0)))
+                route, before = route._replace(u=loaded.u, loads=(1.0, 1.0)), loaded.steps
+        result = replace(self._beginning(route), steps=before)
+        options = self._options(route, "mixed")
+        step = Increment(system, result, 1.0, options)
         system = step.system
         if (not (system.symmetric or self.stabilised_by_loads or self._has_friction)
                 and not stability.has_potential(system, route.u, 1.0)):
@@ -394,10 +363,6 @@ class Search:
     def _options(self, route, method, watched=False):
         watched = watched and method == "mixed" and self._auto and not self.touches
         return Options(route, method, self.rules.tol, self.rules.max_iterations, watched)
-
-    def _ends_stable(self, route):
-        """True if the end of a route has to be stable."""
-        return self.stable and route.load_and_time(1.0) == (1.0, self.route.times[1])
 
     def _require_good(self, result):
         """Raise LoadStepFailed if a rigid motion is not stabilised, or an axis is folded."""
@@ -436,17 +401,13 @@ class Search:
         return StaticResult(route.u, np.zeros(self.system.constraints.m), 0.0, None, [], False,
                             "no load step has converged", memory=self._memory)
 
-    def load_steps(self, method: str, route: Route | None = None,
-                   result: StaticResult | None = None, size: float | None = None,
-                   few: bool = False) -> StaticResult:
-        """The equilibrium at the end of a route by load steps, from a result on."""
-        # The first one has a ``size``. With ``few``, they stop after :data:`FEW` iterations, or if
-        # the first :data:`CUT` steps fail.
-        rules, route = self.rules, route or self.route
-        stable, result = self._ends_stable(route), result or self._beginning(route)
-        size, cuts, spent = size or rules.first_step, 0, 0
-        if size < rules.first_step:  # a strategy has tried the larger step
-            result.rejected, cuts = 1, int(self._unstable)
+    def load_steps(self, method: str, few: bool = False) -> StaticResult:
+        """The equilibrium at full load by load steps."""
+        # With ``few``, they stop after :data:`FEW` iterations.
+        rules, route, stable, spent = self.rules, self.route, self.stable, 0
+        result, size, cuts = self._beginning(route), rules.first_step, 0
+        if self._auto and self._at_once:  # a strategy has tried the larger step
+            size, result.rejected, cuts = 0.25, 1, int(self._unstable)
         options = self._options(route, method, watched=few)
         patience = 3 if self.touches else 1
         with progress_bar(self.progress, total=1.0, desc="load") as bar:
@@ -465,9 +426,7 @@ class Search:
                     many = few and spent + step.record.iterations >= FEW * patience
                     if stable and (cuts > strategies.CUTS or size < rules.min_step or many):
                         found = step.rescue(failure)
-                    none = few and not result.steps and result.rejected > CUT
-                    none = none or self._exhausted
-                    if found is None and (size < rules.min_step or many or none):
+                    if found is None and (size < rules.min_step or many or self._exhausted):
                         failure.load = load
                         raise
                 finally:
@@ -479,16 +438,13 @@ class Search:
                 bar.update(size)
                 # one assignment, so that an interrupt finds the old or the new result
                 result = step.reached(found)
-                if route is self.route and (self._furthest is None
-                                            or result.load > self._furthest.load):
+                if self._furthest is None or result.load > self._furthest.load:
                     self._furthest = result  # for errors
                 cuts = 0
                 logger.info("load %.6g converged in %d iterations", load, step.record.iterations)
                 if step.record.iterations <= patience * max(8, rules.max_iterations // 3):
                     size *= 2.0
-                many = few and spent >= FEW * patience and not (
-                    result.doubt and not self.touches)
-                if result.load < 1.0 and (many or self._exhausted):
+                if result.load < 1.0 and self._exhausted:
                     raise LoadStepFailed(f"the full load was not reached in {spent} iterations")
         return result
 

@@ -30,7 +30,7 @@ from ..core import Array
 from ..core.band import NO_FACTORS, fix
 from ..core.callbacks import handle_of
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
-                                   position_weights, potential, verdict)
+                                   position_weights, potential, response, verdict)
 from ..equations.system import System
 from .outcome import Equilibrium, LoadStepFailed, StaticResult
 
@@ -296,6 +296,8 @@ def _side(system, descent, v, u, last, load):
     return 1.0 if v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))] > 0 else -1.0
 
 
+#: Tolerance of an equilibrium that is only a start.
+CLOSE = 1e-2
 #: Distance of points that are bound at first, and range of the bond, relative to the height.
 NEAR, FAR = 0.5, 1e3
 #: Least fraction of the surface that is near an obstacle if points are bound.
@@ -376,77 +378,88 @@ def required_firmness(contacts: Contacts, u: Array, t: float, energy: float,
     return out
 
 
-def search_contact(contacts: Contacts, start: tuple[Array, float], t: float,
-                   solve: Callable[..., Any], energy: Callable[[Array], float],
-                   respond: Callable[..., Any], close: bool = False, dragged: bool = False) -> Any:
-    """An equilibrium in contact at the time t, from a displacement and its time."""
-    # Obstacles have the contact history at the start of the load step. ``solve`` takes the last
-    # equilibrium (None for the start), whether a rough one suffices, and the number of iterations.
-    # ``respond`` is that of ``contacts.yielding`` at an equilibrium. If the start is ``close`` to
-    # the equilibrium, few iterations are tried.
-    memory, before = contacts.tables.memory, contacts.tables.memory.copy()
-    ramp = StiffnessRamp(contacts, start, t, solve, energy, respond)
+class ContactSearch:
+    """The search for an equilibrium in contact at the end of an increment. Obstacles have the
+    contact history at its start."""
 
-    def from_soft(most=None):
+    def __init__(self, increment: Any) -> None:
+        start, options = increment.start, increment.options
+        self.increment, self.contacts = increment, increment.system.forces.contacts
+        self.start, self.t = (start.u, options.route.load_and_time(start.load)[1]), increment.time
+        self._memory = self.contacts.tables.memory
+
+    def find(self) -> Equilibrium:
+        """The equilibrium on obstacles that are stiff enough."""
+        options, before = self.increment.options, self._memory.copy()
+        ways: list[Callable[[], Any]] = [self._from_soft, self._directly]
+        flags = None
+        if options.drag is not None:  # which already stabilises the iteration
+            ways = [self._directly]
+        elif options.close:  # to the equilibrium: few iterations are tried
+            ways = [partial(self.solve, None, False, MOST_DIRECT),
+                    partial(self._from_soft, MOST_FROM_SOFT)]
+        else:
+            flags = lies_near(self.contacts, *self.start)
+        if flags is not None:
+            ways.insert(0, partial(self._released, flags))
+        *first, last = ways
+        for way in first:
+            try:
+                return self._stiffened(way(), flags is not None and way is first[0])
+            except LoadStepFailed:
+                self._memory[:] = before
+        return self._stiffened(last(), False)
+
+    def solve(self, begin: Any, rough: bool, most: int | None = None) -> Equilibrium:
+        """Iterate from an equilibrium, None for the start; a ``rough`` one is only a start."""
+        options = self.increment.options
+        chosen = options._replace(most=min(options.most, most or options.most))
+        if rough:
+            chosen = options._replace(tol=max(options.tol, CLOSE),
+                                      most=min(options.most, MOST_FROM_SOFT))
+        if begin is None:
+            return self.increment.from_start(chosen)
+        return self.increment.iterate(begin, chosen)
+
+    def _from_soft(self, most=None):
         # on soft obstacles contacts do not open and close one after the other: the correction that
         # moves one point out of the obstacle does not throw off its neighbours
-        with contacts.without_friction(soft=True):
-            found = solve(None, True)
-        return solve(found, False, most)
+        with self.contacts.without_friction(soft=True):
+            found = self.solve(None, True)
+        return self.solve(found, False, most)
 
-    def released():  # rough, on soft obstacles, from points that are bound
+    def _released(self, flags):
+        """Rough, on soft obstacles, from points that are bound."""
+        contacts = self.contacts
         with bound(contacts, flags):
-            found = solve(None, True)
-        contacts.set_hardening(releasing_firmness(contacts, found[0], t), *start)
+            found = self.solve(None, True)
+        contacts.set_hardening(releasing_firmness(contacts, found.u, self.t), *self.start)
         if contacts.anchored:
             with contacts.without_friction():
-                found = solve(found, True)
-        return solve(found, True)
+                found = self.solve(found, True)
+        return self.solve(found, True)
 
-    def directly():
+    def _directly(self):
         try:
-            return solve(None, False)
+            return self.solve(None, False)
         except LoadStepFailed:
-            if not contacts.anchored:
+            if not self.contacts.anchored:
                 raise
-            with contacts.without_friction():
-                found = solve(None, True)
-            return solve(found, False)
+            with self.contacts.without_friction():
+                found = self.solve(None, True)
+            return self.solve(found, False)
 
-    flags = None if close or dragged else lies_near(contacts, *start)
-    ways: list[Callable[[], Any]] = [released] if flags is not None else []
-    if dragged:  # which already stabilises the iteration
-        ways = [directly]
-    elif close:
-        ways = [partial(solve, None, False, MOST_DIRECT), partial(from_soft, MOST_FROM_SOFT)]
-    else:
-        ways += [from_soft, directly]
-    for way in ways:
-        try:
-            return ramp.climb(way(), rough=way is released)
-        except LoadStepFailed:
-            if way is ways[-1]:
-                raise
-            memory[:] = before
-
-
-class StiffnessRamp:
-    """Stiffens soft obstacles step by step; see :func:`search_contact`."""
-
-    def __init__(self, contacts: Any, start: Any, t: float, solve: Any, energy: Any,
-                 respond: Any) -> None:
-        self.contacts, self.start, self.t, self.respond = contacts, start, t, respond
-        self.solve, self.energy = solve, energy
-
-    def climb(self, found: Any, rough: bool) -> Any:
+    def _stiffened(self, found, rough):
         """The equilibrium on stiff obstacles, or the last one before a failure."""
         # ``rough``: ``found`` is one that is only a start.
-        contacts = self.contacts
-        for _ in range(0 if contacts.untouched(found[0]) else TIMES):
-            u, yields = found[0], np.zeros(len(contacts.groups))
+        contacts, increment, t = self.contacts, self.increment, self.t
+        system = increment.system
+        for _ in range(0 if contacts.untouched(found.u) else TIMES):
+            u, yields = found.u, np.zeros(len(contacts.groups))
             if any(group.firmest > 1.0 for _, group in contacts.groups):
-                yields = contacts.yielding(u, self.t, self.respond(found))
-            wanted = required_firmness(contacts, u, self.t, self.energy(u), yields)
+                yields = contacts.yielding(u, t, response(system, u, increment.load, t,
+                                                          found.multipliers))
+            wanted = required_firmness(contacts, u, t, system.strain_energy(u, t), yields)
             if np.all(wanted == contacts.firmness):
                 break
             found, done, rough = self._to(wanted, found, rough)
@@ -457,16 +470,15 @@ class StiffnessRamp:
     def _to(self, wanted, found, rough):
         """The equilibrium at a firmness or the last one before it; if reached; if it is rough."""
         contacts, step, fails = self.contacts, STEP, 0
-        memory = contacts.tables.memory
         while True:
-            before, now = memory.copy(), 1.0 + contacts.firmness
+            before, now = self._memory.copy(), 1.0 + contacts.firmness
             more = np.clip((1.0 + wanted) / now, 1.0 / step, step)
             last = np.allclose(more * now, 1.0 + wanted, rtol=1e-9)
             contacts.set_hardening(wanted if last else more * now - 1.0, *self.start)
             try:
                 found = self.solve(found, not last)
             except LoadStepFailed:
-                memory[:] = before
+                self._memory[:] = before
                 step, fails = np.sqrt(step), fails + 1
                 if fails > RETRIED:
                     return found, False, rough
