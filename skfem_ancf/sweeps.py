@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .core import (Array, ArrayLike, CallError, CallbackError, InputError, Interrupted, PickleError,
+from .core import (Array, ArrayLike, CallbackError, CallError, Interrupted, PickleError,
                    SweepWarning, refuse, require_function, require_integer, require_like,
                    require_module, require_option, shown, warn)
 from .core.progress import progress_bar
@@ -137,8 +137,8 @@ def sweep(build: Callable[..., Any],
     """
     require_function("build", build, "of the parameters that returns a scene")
     require_function("measure", measure, "of the scene that returns numbers")
-    if workers is not None and client is not None:
-        raise InputError("workers and client exclude each other: give one of them")
+    refuse(workers is not None and client is not None, "workers and client exclude each other: "
+           "give one of them")
     members = _members(parameters)
     try:
         inspect.signature(build).bind(**members[0])

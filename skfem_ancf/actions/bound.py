@@ -314,10 +314,9 @@ class Remembering:
         """Force and history after ``dt``, by default the span."""
         dt = float(self.span[0]) if dt is None else dt
         force, after = self.element.evaluate(x, v, t, self.history, dt)
-        if np.shape(after) != self.start.shape:
-            raise InputError(f"evaluate(x, v, t, history, dt) of {self!r} must return the force "
-                             f"and a history of the shape of start(), {self.start.shape}, got "
-                             f"{np.shape(after)}")
+        refuse(np.shape(after) != self.start.shape, "evaluate(x, v, t, history, dt) of {!r} must "
+               "return the force and a history of the shape of start(), {}, got {}", self,
+               self.start.shape, np.shape(after))
         return np.asarray(force), np.asarray(after)
 
     def force(self, x: Array, v: Array, t: float) -> Array:
@@ -452,18 +451,18 @@ def _require_derivatives(bound, x, u, d):
     v, d = u.reshape(x.shape), d.reshape(x.shape)
     for name, at in (("stiffness", lambda s: (x + v + s * d, 0.0 * d, 0.0)),
                      ("resistance", lambda s: (x, v + s * d, 0.0))):
-        require_slope(f"{name}(x, v, t) of {bound!r}", "force(x, v, t)", along(
-            lambda s, at=at: bound.force(*at(s))),
-            _matrix(getattr(bound, name)(*at(0.0)), d.size) @ d.ravel())
+        require_slope(f"{name}(x, v, t) of {bound!r}", "force(x, v, t)",
+                      lambda s, at=at: bound.force(*at(s)),
+                      _matrix(getattr(bound, name)(*at(0.0)), d.size) @ d.ravel())
 
 
 def _require_potential(bound, x, u, d):
     x, d = x + u.reshape(x.shape), d.reshape(x.shape)
     for t in (0.0, ASIDE):
-        require_slope(f"minus force(x, v, t) of {bound!r}", "potential(x)", along(
-            lambda s, t=t: bound.potential_at(x + s * d, t)),
-            -np.sum(bound.force(x, 0.0 * x, t) * d), else_=". Without potential(x), as for a force "
-            "that depends on time, the energy balance is that of the scheme")
+        require_slope(f"minus force(x, v, t) of {bound!r}", "potential(x)",
+                      lambda s, t=t: bound.potential_at(x + s * d, t),
+                      -np.sum(bound.force(x, 0.0 * x, t) * d), else_=". Without potential(x), as "
+                      "for a time-dependent force, the energy balance is that of the scheme")
 
 
 def require_derivatives(joint: BoundConstraint, sizes: Array, u: Array, d: Array) -> None:
@@ -637,9 +636,8 @@ def force_of(item: Any, layout: Layout) -> BoundForce:
     out.of_item, out.name, out._key = item, item.name, item._key
     out.symmetric, out.dissipates = item.symmetric, item.dissipates
     dofs = np.arange(N) if item.dofs is None else np.unique(item.dofs)
-    if dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < N):
-        raise InputError(f"dofs of {item!r} must be numbers from 0 to {N - 1}, got "
-                         f"{shown(item.dofs)}")
+    refuse(dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < N), "dofs of "
+           "{!r} must be numbers from 0 to {}, got {!r}", item, N - 1, item.dofs)
     if hasattr(item, "mass"):
         M = sparse.coo_array(item.mass())
         refuse(M.shape != (N, N), "mass() of {!r} must have the shape {}, got {}", item, (N, N),

@@ -348,10 +348,9 @@ def _evaluated(name, f, x, y):
 def require_alone(loads: Sequence[Any]) -> None:
     strains = [load for load in loads if isinstance(load, EigenStrain)]
     for load in strains:
-        refuse(load.grows and sum(other.beam is load.beam for other in strains) > 1,
-               "the material of {!r} is nonlinear, so eigenstrains cannot be superposed: give "
-               "their sum as one eigenstrain, a function of (x, y), or such a function times a "
-               "function of t", load.beam)
+        refuse(load.grows and sum(other.beam is load.beam for other in strains) > 1, "the material "
+               "of {!r} is nonlinear, so eigenstrains cannot be superposed: give their sum as one, "
+               "a function of (x, y), or such a function times one of t", load.beam)
 
 
 def _of_fibres(beam, eigen):

@@ -13,8 +13,8 @@ from skfem.element import DiscreteField
 
 from ..beam.distribution import AXIS, BODY, Distribution, Sampled, facets_along
 from ..beam import Domain, WhichMember
-from ..core import (Array, CallbackError, InputError, Place, TimeFunction, along, explained, gauss,
-                    refuse, require_finite, require_flag, require_slope, shown, warnings_as_errors)
+from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss, refuse,
+                    require_finite, require_flag, require_slope, shown, warnings_as_errors)
 from .energy import Density, points_of
 from .bound import at_generic_displacements
 from .loads import DeadLoad
@@ -212,8 +212,8 @@ class FormLoad(Density):
         y, dy = self._variables(u, part), self._variables(d, part)
         dy -= self._variables(0.0 * d, part)
         slope = np.einsum("klep,lep->kep", self._curvature(y, part), dy)
-        require_slope(f"tangent of {self!r}", "the form", along(
-            lambda s: -self._slope(y + s * dy, part)), -slope)
+        require_slope(f"tangent of {self!r}", "the form",
+                      lambda s: -self._slope(y + s * dy, part), -slope)
 
     def distribution(self, u: Array) -> Distribution | None:
         part, = self._parts

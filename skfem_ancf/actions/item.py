@@ -8,7 +8,7 @@ from os import urandom
 from typing import TYPE_CHECKING, Any
 
 from ..beam import Layout
-from ..core import Immutable, InputError, explained, refuse, shown
+from ..core import Immutable, InputError, explained, refuse
 from .bound import Bound, user_parts
 
 if TYPE_CHECKING:
@@ -110,9 +110,8 @@ class Item(Immutable, Bound):
                 f"velocities of all degrees of freedom, shape ({layout.N},)")
         with explained("{!r} fails in the reference configuration", hint, InputError, self):
             bound = self.bind(layout)
-            if not isinstance(bound, Item):
-                raise InputError(f"bind(layout) of {self!r} must return an Item, got "
-                                 f"{shown(bound)}")
+            refuse(not isinstance(bound, Item), "bind(layout) of {!r} must return an Item, got "
+                   "{!r}", self, bound)
             out = user_parts(bound, layout)
         refuse(not out, "{!r} does nothing: an item defines energy(u, t), force(u, v, t), "
                "constraint(u, t) or mass()", self)

@@ -16,7 +16,7 @@ from ..beam.distribution import (AXIS, Distribution, Sampled, add_nodal, divided
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
 from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,
-                    along, ask_field, ask_number, gauss, is_builtin, read_only, refuse,
+                    along, ask_field, ask_number, gauss, is_builtin, read_only, refuse, refuse_any,
                     require_finite, require_finite_scalar, require_function, require_slope, sample,
                     shown, warn)
 from ..mesh.places import facets_of, node_of
@@ -208,14 +208,12 @@ def _factored(factor, amplitude, t):
 
 def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
     """A load bound to a beam; its results are checked."""
-    if isinstance(beam, RigidBody) and not load.for_bodies:
-        raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
-                         "takes scene.gravity, point_force, follower_force, moment, springs and "
-                         "joints")
-    if isinstance(beam, Domain) and is_builtin(load) and not load.for_domains:
-        raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a domain takes "
-                         "scene.gravity, point_force, springs, joints, and scene.load(form, "
-                         "boundary) with any LinearForm")
+    refuse(isinstance(beam, RigidBody) and not load.for_bodies, "{} acts on beams and not on "
+           "{!r}: a rigid body takes scene.gravity, point_force, follower_force, moment, springs "
+           "and joints", type(load).__name__, beam)
+    refuse(isinstance(beam, Domain) and is_builtin(load) and not load.for_domains, "{} acts on "
+           "beams and not on {!r}: a domain takes scene.gravity, point_force, springs, joints, "
+           "and scene.load(form, boundary) with any LinearForm", type(load).__name__, beam)
     bound = load.bind(cast("Beam", beam))
     if not isinstance(bound, Load) or bound.beam is not beam:
         raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {shown(bound)}")
@@ -229,18 +227,17 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
         bound._freeze()
 
         def require_constant(u: Array, _: Array) -> None:
-            if np.any(np.abs(bound.force(u) - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
-                raise InputError("force(u) depends on the displacement: set constant = False in "
-                                 "its class and define stiffness(u)")
+            off = np.abs(bound.force(u) - force)
+            refuse(np.any(off > 1e-12 * np.max(np.abs(force), initial=0.0)), "force(u) depends on "
+                   "the displacement: set constant = False in its class and define stiffness(u)")
 
         if bound.constant:
             at_generic_displacements(require_constant, beam.sizes)
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
-        raise InputError(f"{load!r} does not fit this beam: {error}. Meshes change, by adapt= and "
-                         "by refinement: compute arrays of the size of a mesh in bind(beam) or "
-                         "force(u)") from None
+        raise InputError(f"{load!r} does not fit this beam: {error}. Meshes change: compute arrays "
+                         "of the size of a mesh in bind(beam) or force(u)") from None
     except Exception as error:  # user-defined loads may raise anything
         raise InputError(f"{load!r} fails in the reference configuration: {type(error).__name__}: "
                          f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "
@@ -251,10 +248,8 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
     if isinstance(beam, Beam):  # the next node may be that of another chain
         first, last = np.sort(beam.mesh.t, axis=0)
         far |= (low < high) & ~np.isin(low * beam.N + high, first * beam.N + last)
-    if np.any(far):
-        k = int(np.argmax(far))
-        raise InputError(f"the stiffness of {load!r} couples the nodes {low[k]} and {high[k]}: "
-                         "only neighbours of the chain may be coupled, as they are in its elements")
+    refuse_any(far, "the stiffness of {!r} couples the nodes {} and {}: only neighbours of the "
+               "chain may be coupled, as they are in its elements", load, low, high)
     at_generic_displacements(partial(_require_derivatives, bound), bound.beam.sizes)
     return bound
 

@@ -151,13 +151,10 @@ def _section_of_frame(layout, beam, at):
     if not ends:
         return named_place(layout, at) if beam is None else (beam, at)
     rigid = [end for end in ends if not end[2]]
-    if not rigid and len(ends) > 1:
-        k, node, _ = ends[0]
-        name = layout.members[k].name or k
-        raise InputError(f"the lines at {shown(at)} are hinged there, and each has a rotation of "
-                         f"its own: name the beam of one, or its section, as {name!r} and "
-                         f"np.array([{node}])")
     k, node, _ = (rigid or ends)[0]
+    refuse(not rigid and len(ends) > 1, "the lines at {!r} are hinged there, and each has a "
+           "rotation of its own: name the beam of one, or its section, as {!r} and np.array([{}])",
+           at, layout.members[k].name or k, node)
     return k, np.array([node])
 
 
@@ -216,10 +213,9 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
     found = nearest_of(layout, place, found)
     if len(found) > 1 and layout.nodes is not None:  # they share a node
         found = [k for k, *_ in layout.nodes.ends_at(layout, place)][:1] or found
-    if len(found) > 1:
-        names = [layout.members[k].name or k for k in found]
-        raise InputError(f"the point {shown(place)} is in several beams, {names}: choose one, "
-                         f"as ({names[0]!r}, {shown(place)})")
+    names = [layout.members[k].name or k for k in found]
+    refuse(len(found) > 1, "the point {!r} is in several beams, {}: choose one, as ({[0]!r}, {!r})",
+           place, names, names, place)
     refuse(not found and where_none_is is None, "no beam and no rigid body is at the point {!r}: "
            "for one of the ground write ('ground', {!r}), for one outside of the outline of a "
            "rigid body (body, (x, y))", place, place)
@@ -271,7 +267,6 @@ def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:
             x, name = min(others, key=lambda one: np.hypot(*(one[0] - at)))
             near = (f"; the nearest node of another beam, {name!r}, is at ({x[0]:.6g}, "
                     f"{x[1]:.6g}), {np.hypot(*(x - at)):.6g} away")
-        raise InputError(f"a joint at {shown(places[0])} needs two beams or rigid bodies there, "
-                         f"found {names}{near}: name a place of each, as (beam, (x, y)) or "
-                         "('ground', (x, y))")
+        refuse(True, "a joint at {!r} needs two beams or rigid bodies there, found {}{}: name a "
+               "place of each, as (beam, (x, y)) or ('ground', (x, y))", places[0], names, near)
     return found, tuple(map(float, at))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..beam import Beam, Domain, Layout, WhichBeam, on_body
 from ..beam.kinematics import plane
-from ..core import InputError, Place, SupportError, require_finite_scalar, require_option, shown
+from ..core import Place, SupportError, refuse, require_finite_scalar, require_option, shown
 from ..mesh.places import is_point, node_of
 from .item import Item
 from .symbols import Symbol, supports_of
@@ -102,11 +102,10 @@ class Pin(Support):
         if is_point(self.boundary) and isinstance(beam, Beam):
             x = np.asarray(self.boundary, dtype=float)
             axis = np.round(beam.mesh.p[:, node_of(beam.mesh, self.boundary)], 12) + 0.0
-            if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
-                raise InputError(
-                    f"pin fixes the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "
-                    f"({x[0]:.9g}, {x[1]:.9g}) of its section: give that point of the axis, or "
-                    'fix the other with scene.joint("position", at=..., r=lambda t: point)')
+            refuse(np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height, 'pin fixes the axis, at '
+                   '({:.9g}, {:.9g}), and not the point ({:.9g}, {:.9g}) of its section: give '
+                   'that point of the axis, or fix the other with scene.joint("position", '
+                   'at=..., r=lambda t: point)', axis[0], axis[1], x[0], x[1])
         return bound
 
 

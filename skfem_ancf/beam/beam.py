@@ -11,9 +11,9 @@ from scipy.sparse import csr_matrix
 from skfem.assembly import Basis, FacetBasis
 from skfem.element import ElementVector
 
-from ..core import (Array, ArrayLike, Immutable, InputError, NameUnknown, Place, cached_property,
-                    read_only, refuse, require_finite, require_flag, require_integer, require_label,
-                    require_like, require_names, require_unmasked, shown)
+from ..core import (Array, ArrayLike, Immutable, Place, cached_property, read_only, refuse,
+                    require_finite, require_flag, require_integer, require_kind, require_label,
+                    require_like, require_names, require_option, require_unmasked)
 from ..elements import ElementBeam, choose_element
 from ..formulations import Formulation, Term, get_formulation
 from ..materials import Material
@@ -117,23 +117,20 @@ class Beam(Immutable):
                  name: str | None = None, compiled: bool = True, fields: str | Sequence[str] = (),
                  tolerance: float = 1e-3, damping: KelvinVoigt | None = None,
                  section: Section | None = None) -> None:
-        if not isinstance(mesh, MeshBeam):
-            raise InputError(f"mesh must be a MeshBeam, got {shown(mesh)}")
+        require_kind("mesh", mesh, MeshBeam)
         self.section = _section(section, width)
-        if (material is None) != self.section.has_materials or not isinstance(
-                material, (Material, type(None))):
-            raise InputError(f"material must be None, since {self.section!r} has its own, got "
-                             f"{shown(material)}" if self.section.has_materials else
-                             f"material must be a Material, got {shown(material)}")
+        if self.section.has_materials:
+            refuse(material is not None, "material must be None, since {!r} has its own, got {!r}",
+                   self.section, material)
+        else:
+            require_kind("material", material, Material)
         self._given = material
         self.material = material or self.section.layers_on(mesh, None)[0].material
         if isinstance(element, str) and element == "auto":
             element = choose_element(mesh, self.material.reference()[0], fields, tolerance)
-        if not isinstance(element, ElementBeam):
-            raise InputError(f"element must be a ElementBeam, got {shown(element)}")
-        if damping is not None and not isinstance(damping, KelvinVoigt):
-            raise InputError("damping must be a KelvinVoigt, as KelvinVoigt(1e-4), or None, got "
-                             f"{shown(damping)}")
+        if damping is not None:
+            require_kind("damping", damping, KelvinVoigt, ", as KelvinVoigt(1e-4), or None")
+        element = require_kind("element", element, ElementBeam)
         self.element: ElementBeam = self.section.element_for(element)
         self.mesh, self.damping = self.element.fitted(mesh), damping
         self.formulation: Formulation = get_formulation(formulation)
@@ -166,8 +163,7 @@ class Beam(Immutable):
         known = ("mesh", "element", "material", "width", "formulation", "name", "compiled",
                  "damping", "section")
         for name in changes:
-            if name not in known + ("fields", "tolerance"):
-                raise NameUnknown("argument of Beam", name, known)
+            require_option("argument of Beam", name, known + ("fields", "tolerance"))
         given = {name: getattr(self, name) for name in known} | {"material": self._given}
         given["section" if "width" in changes and isinstance(self.section, Rectangle) else
               "width"] = None
@@ -330,8 +326,8 @@ class Beam(Immutable):
         if tind is not None:
             require_unmasked("tind", tind)
             tind = self.mesh.normalize_elements(tind)
-        if X.ndim == 3 and X.shape[1] != (self.mesh.nelements if tind is None else len(tind)):
-            raise InputError(f"X must have points for each element, got shape {X.shape}")
+        refuse(X.ndim == 3 and X.shape[1] != (self.mesh.nelements if tind is None else len(tind)),
+               "X must have points for each element, got shape {}", X.shape)
         return u, X, tind
 
     @cached_property
@@ -375,14 +371,10 @@ class Beam(Immutable):
 
 def _section(section, width):
     """The section, or a rectangle of the given width."""
-    if section is None and width is None:
-        raise InputError("a beam has a section: give width=, that of a rectangle, or section=, as "
-                         'Section.profile("IPE 200")')
+    refuse(section is None and width is None, 'a beam has a section: give width=, that of a '
+           'rectangle, or section=, as Section.profile("IPE 200")')
     if section is None:
         return Rectangle(width)
-    if width is not None:
-        raise InputError(f"give a width or a section, not both: got {shown(width)} and {section!r}")
-    if not isinstance(section, Section):
-        raise InputError('section must be a Section, as Section.profile("I", width=0.05, '
-                         f"web=0.005, flange=0.008), got {shown(section)}")
-    return section
+    refuse(width is not None, "give a width or a section, not both: got {!r} and {!r}", width,
+           section)
+    return require_kind("section", section, Section, ', as Section.profile("IPE 200")')

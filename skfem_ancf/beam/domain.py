@@ -12,8 +12,8 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from skfem import Basis, BilinearForm, ElementVector, LinearForm
 from skfem.assembly.dofs import DofsView
 
-from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, along,
-                    explained, gauss, read_only, refuse, require_finite, require_label,
+from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, explained,
+                    gauss, read_only, refuse, refuse_any, require_finite, require_label,
                     require_option, require_slope, shown)
 from ..materials import Material
 from ..mesh.places import as_point, is_point
@@ -259,9 +259,9 @@ class Domain(Immutable):
         mesh = self.basis.mesh  # strains are small in the thinnest cell
         thin = np.min(self.basis.dx.sum(axis=1) / np.ptp(mesh.p[:, mesh.t], axis=1).max(axis=0))
         u, v = thin * np.array([[1e-2], [1e-4]]) * np.cos(np.arange(2.0 * self.N)).reshape(2, -1)
-        forces, K = along(lambda s: require_finite(
-            f"the residual of {self!r}", self.force(u + s * v))), self.matrix(u)
-        require_slope(f"the tangent of {self!r}", "the residual", forces, K @ v)
+        K = self.matrix(u)
+        require_slope(f"the tangent of {self!r}", "the residual", lambda s: require_finite(
+            f"the residual of {self!r}", self.force(u + s * v)), K @ v)
         self.symmetric = bool(abs(K - K.T).max() <= 1e-10 * abs(K).max())
 
     # the interface of a beam
@@ -315,17 +315,14 @@ class Domain(Immutable):
     @cached_property
     def _mass(self):
         if self.mass is None:
-            how = ("give its form, Domain(..., mass=BilinearForm(lambda u, v, w: rho * width * "
-                   "dot(u, v)))" if self._solid is None else "give its material a density")
-            raise InputError(f"{self!r} has no mass: {how}")
+            raise InputError(f"{self!r} has no mass: give its material a density, or a Domain of "
+                             "forms mass=BilinearForm(lambda u, v, w: rho * width * dot(u, v))")
         M = sparse.csr_array(self._ask("mass", self.mass.assemble, self.basis))
         require_finite(f"the mass of {self!r}", M.data)
         low, size = M.diagonal().min(), abs(M).max()
-        if low < -1e-12 * size or abs(M - M.T).max() > 1e-10 * size:
-            raise InputError(
-                f"the mass of {self!r} must be symmetric and not negative, as rho * width * "
-                "dot(u, v), got " + (f"a diagonal with {low:.6g}" if low < 0.0 else
-                                     "a form in which u and v cannot be interchanged"))
+        refuse(low < -1e-12 * size or abs(M - M.T).max() > 1e-10 * size, "the mass of {!r} must be "
+               "symmetric and not negative, as rho * width * dot(u, v), got a diagonal with "
+               "{:.6g}, or a form in which u and v cannot be interchanged", self, low)
         return M[self._order][:, self._order]
 
     @property
@@ -370,12 +367,11 @@ class Domain(Immutable):
         if isinstance(boundary, str):
             require_option("boundary", boundary, mesh.boundaries or {})
         refuse(is_point(boundary), "a boundary of {!r} is needed here, got the point {!r}; "
-               "scene.pin supports a point, and scene.hinge connects it to another one", self,
-               boundary)
-        found = mesh.normalize_facets(boundary)
-        if not len(found):
-            raise MeshError(f"no facet of the boundary of {self!r} is at {shown(boundary)}")
-        return np.asarray(found)
+               "scene.pin supports a point, scene.hinge connects it", self, boundary)
+        found = np.asarray(mesh.normalize_facets(boundary))
+        refuse(not len(found), "no facet of the boundary of {!r} is at {!r}", self, boundary,
+               error=MeshError)
+        return found
 
     def dofs(self, boundary: Any = None, names: str | Sequence[str] | None = None) -> Array:
         """Numbers of DOFs, shape (n,).
@@ -459,9 +455,7 @@ class Domain(Immutable):
     def probes(self, x: Array) -> tuple[Array, Array]:
         """Numbers (2, k, n) and weights (k, n) of the DOFs in the displacement of points (2, n)."""
         cells, X = self._locate(x)
-        if np.any(cells < 0):
-            k = int(np.argmax(cells < 0))
-            raise MeshError(f"the point ({x[0, k]:.6g}, {x[1, k]:.6g}) is outside of {self!r}")
+        refuse_any(cells < 0, "the point {:.6g} is outside of {!r}", x, self, error=MeshError)
         dofs = self.numbers(self.basis.element_dofs[:, cells]).reshape(-1, 2, len(cells))
         return dofs.swapaxes(0, 1), self._functions(X[:, :, None], cells)[..., 0]
 
@@ -524,9 +518,8 @@ def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array
 
 def _require_plane(basis):
     refuse(not isinstance(basis, Basis), "a Domain needs a Basis of scikit-fem, got {!r}", basis)
-    if basis.mesh.dim() != 2:
-        raise InputError(f"a Domain is plane, as beams are, got a mesh of dimension "
-                         f"{basis.mesh.dim()}: {shown(basis.mesh)}")
+    refuse(basis.mesh.dim() != 2, "a Domain is plane, as beams are, got a mesh of dimension {}: "
+           "{!r}", basis.mesh.dim(), basis.mesh)
     if not isinstance(basis.elem, ElementVector) or basis.elem.dim != 2:
         raise InputError("the unknown of a Domain is a displacement with two components: use an "
                          f"ElementVector(ElementQuad2()), got {shown(basis.elem)}")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import Array, InputError, ModelWarning, first_order, gauss, warn
+from ..core import Array, ModelWarning, first_order, gauss, refuse, warn
 from ..mesh.places import as_point
 from .kernels import CableKernel, SectionKernel
 from .strains import cable_axis, fibres
@@ -22,11 +22,9 @@ KERNELS: dict[str, Any] = {"sections": SectionKernel, "cable": CableKernel}
 def require_cable(beam: Any) -> None:
     """Raise InputError unless the law is Hooke's; warn about a neglected shear stiffness."""
     for layer in beam.across.layers:
-        if not layer.material.is_hooke:
-            raise InputError(
-                "a cable has Hooke's law along its axis and the bending stiffness E I: it cannot "
-                f"have the law of {layer.material!r}. Use StVenantKirchhoff, or an element with "
-                "sections, as ElementBeamANCFCubic(2)")
+        refuse(not layer.material.is_hooke, "a cable has Hooke's law along its axis and the "
+               "bending stiffness E I: it cannot have the law of {!r}. Use StVenantKirchhoff, or "
+               "an element with sections, as ElementBeamANCFCubic(2)", layer.material)
     section, GA = beam.section, getattr(beam.section, "GA", None)
     if GA is None:
         return
@@ -47,11 +45,9 @@ def locate(beam: Any, point: Any) -> tuple[int, Array]:
 def probe(beam: Any, point: Any) -> tuple[Array, Array]:
     """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`."""
     e, X = locate(beam, point)
-    if not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed:
-        raise InputError(
-            f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, where "
-            "the position is not linear in the degrees of freedom: use a point of the axis, and "
-            "scene.moment for a moment on an end section")
+    refuse(not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed, "the point {} is off "
+           "the axis of a cable, where the position is not linear in its unknowns: use a point of "
+           "the axis, or scene.moment on an end", tuple(map(float, np.ravel(point))))
     return probe_reference(beam, e, X)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from .beam import Beam
 from .domain import Domain
-from ..core import Array, InputError, NameUnknown, refuse, shown
+from ..core import Array, NameUnknown, refuse
 from .rigid import RigidBody
 
 #: Argument of :func:`select_beam`: a Beam, its name or number; None for the only one.
@@ -30,15 +30,12 @@ class Layout:
 
     def __init__(self, *members: Beam | RigidBody | Domain) -> None:
         for one in members:
-            if not isinstance(one, (Beam, RigidBody, Domain)):
-                raise InputError("a scene is made of Beams, RigidBodies and Domains, got "
-                                 f"{shown(one)}")
-        if not members:
-            raise InputError("a scene needs at least a Beam, a RigidBody or a Domain, got none")
+            refuse(not isinstance(one, (Beam, RigidBody, Domain)), "a scene is made of Beams, "
+                   "RigidBodies and Domains, got {!r}", one)
+        refuse(not members, "a scene needs at least a Beam, a RigidBody or a Domain, got none")
         names = [one.name for one in members if one.name is not None]
-        if len(set(names)) < len(names) or len(set(map(id, members))) < len(members):
-            raise InputError("the beams of a scene must be different, with different names, got "
-                             f"{names}")
+        refuse(len(set(names)) < len(names) or len(set(map(id, members))) < len(members), "the "
+               "beams of a scene must be different, with different names, got {}", names)
         self.beams = tuple(b for b in members if isinstance(b, Beam))
         self.bodies = tuple(b for b in members if isinstance(b, RigidBody))
         self.domains = tuple(b for b in members if isinstance(b, Domain))
@@ -91,8 +88,8 @@ def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
     refuse(not beams, "a beam is needed here, and the scene has none: give one of its members, its "
            "name or its number; got {!r}", beam)
     refuse(beam is None, "the scene has {} beams: choose one with beam=, of {}", len(beams), known)
-    if isinstance(beam, (RigidBody, Domain)):
-        raise InputError(f"a beam is needed here, got {shown(beam)}; beams are {known}")
+    refuse(isinstance(beam, (RigidBody, Domain)), "a beam is needed here, got {!r}; beams are {}",
+           beam, known)
     raise NameUnknown("beam", beam, known)
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, InputError, MeshError, cached_property, require_finite, require_integer,
-                    require_point, shown)
+from ..core import (Array, InputError, MeshError, cached_property, refuse, require_finite,
+                    require_integer, require_point, shown)
 from ..mesh.places import as_point
 from .beam import Beam
 from .domain import Domain, DomainPoints
@@ -227,13 +227,11 @@ class Points:
             return b, require_integer("line", line, 0, int(b.mesh.chains[-1]))
         number = require_integer("line", line, 0)
         at = np.flatnonzero(self._lines == number)
-        if not len(at):
-            raise InputError(f"the frame has no line {number}: lines are numbered 0 to "
-                             f"{np.max(self._lines)}, without those that begin and end at one node")
+        refuse(not len(at), "the frame has no line {}: lines are numbered 0 to {}, without those "
+               "that begin and end at one node", number, np.max(self._lines))
         k = int(np.searchsorted(self._chains, at[0], side="right")) - 1
-        if beam is not None and select_beam(self.beams, beam) is not self.beams[k]:
-            raise InputError(f"line {number} is in the beam {self.beams[k].name!r}, not in "
-                             f"{shown(beam)}")
+        refuse(beam is not None and select_beam(self.beams, beam) is not self.beams[k], "line {} "
+               "is in the beam {!r}, not in {!r}", number, self.beams[k].name, beam)
         return self.beams[k], int(at[0] - self._chains[k])
 
     def _ask(self, x, beams):
@@ -301,13 +299,11 @@ class Points:
                 parts.append(self._in_body(body, left[on], x[:, left[on]]))
                 left = left[~on]
         if len(left):
-            p = (float(c) for c in x[:, left[0]])
-            more = f" ({len(left)} of {x.shape[1]} points are)" if x.shape[1] > 1 else ""
-            where = "; ".join(
-                f"{k if b.name is None else repr(b.name)}: {b.finder.extent}"
-                for k, b in list(enumerate(self.beams))[:4])
-            raise MeshError(f"the point {shown(tuple(p))} is in none of the {len(self.beams)} "
-                            f"beams{more}; {where}")
+            where = "; ".join(f"{k if b.name is None else repr(b.name)}: {b.finder.extent}"
+                              for k, b in list(enumerate(self.beams))[:4])
+            more = f" ({len(left)} of {x.shape[1]} points are)" * (x.shape[1] > 1)
+            raise MeshError(f"the point {tuple(x[:, left[0]].tolist())} is in none of the "
+                            f"{len(self.beams)} beams{more}; {where}")
         if len(parts) == 1:
             parts[0].index = None
         return parts

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, ArrayLike, Immutable, InputError, angle_of, read_only, rebuilt, refuse,
+from ..core import (Array, ArrayLike, Immutable, angle_of, read_only, rebuilt, refuse,
                     require_finite, require_finite_scalar, require_label, require_names,
-                    require_positive, shown)
+                    require_positive)
 from ..mesh.places import as_point
 
 #: Names of the DOFs: position of the centre of mass, and director.
@@ -74,8 +74,8 @@ class RigidBody(Immutable):
         self.mass = require_positive("mass", mass)
         self.inertia = require_positive("inertia", inertia)
         for name_of, value in (("mass", self.mass), ("inertia", self.inertia)):
-            if value < np.finfo(float).tiny:
-                raise InputError(f"{name_of} is too small, its inverse overflows: got {value!r}")
+            refuse(value < np.finfo(float).tiny, "{} is too small, its inverse overflows: got {!r}",
+                   name_of, value)
         self.position = require_finite("position", position, (2,))
         self.angle = require_finite_scalar("angle", angle)
         self.name = require_label("name", name)
@@ -86,10 +86,9 @@ class RigidBody(Immutable):
             points = require_finite("outline", outline)
             if points.ndim == 2 and points.shape[1] == 2:  # n >= 3, so that (2, n) differs
                 points = points.T
-            if points.ndim != 2 or len(points) != 2 or points.shape[1] < 3 or not np.any(points):
-                raise InputError("an outline is a polygon of at least three corners, relative to "
-                                 "the centre of mass: a list of points, or an array of shape "
-                                 f"(n, 2), got {shown(outline)}")
+            refuse(points.ndim != 2 or len(points) != 2 or points.shape[1] < 3 or not points.any(),
+                   "an outline is a polygon of at least three corners, relative to the centre of "
+                   "mass: a list of points, or an array of shape (n, 2), got {!r}", outline)
         self.outline = points
         c, s = np.cos(self.angle), np.sin(self.angle)
         self.q0 = np.array([*self.position, c, s])

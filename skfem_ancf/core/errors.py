@@ -198,20 +198,23 @@ class _Shown:
     def __repr__(self):
         return shown(self.value)
 
+    def __getitem__(self, key):  # {[0]} takes an entry only if something is wrong
+        return _Shown(self.value[key])
+
     def __format__(self, spec):
         if spec and isinstance(self.value, (list, tuple, np.ndarray)):
             return f"({', '.join(format(one, spec) for one in self.value)})"
         return format(self.value, spec)
 
 
-def refuse(wrong: object, message: str, *values: Any, error: type[InputError] = InputError) -> None:
+def refuse(wrong: object, message: str, *values: Any, error: type[AncfError] = InputError) -> None:
     """Raise an error if something is wrong, with values in its message: ``{!r}`` shortens one."""
     if wrong:
         raise error(message.format(*map(_Shown, values)) if values else message)
 
 
 def refuse_any(wrong: Any, message: str, *values: Any,
-               error: type[InputError] = InputError) -> None:
+               error: type[AncfError] = InputError) -> None:
     """As :func:`refuse` for the first True of an array (n,): its number is ``{k}``; arrays among
     the values, (..., n), are taken there."""
     if np.any(wrong):
@@ -401,11 +404,13 @@ def along(function: Callable[[float], Any]) -> list[Array]:
     return [np.asarray(function(s)) for s in (-1.0, 0.0, 1.0)]
 
 
-def require_slope(what: str, of: str, values: Sequence[Any], slope: Any, noise: float | None = None,
-                  else_: str = "") -> None:
-    """Raise InputError unless ``slope`` is the derivative of ``values`` of :func:`along`."""
+def require_slope(what: str, of: str, values: Sequence[Any] | Callable[[float], Any], slope: Any,
+                  noise: float | None = None, else_: str = "") -> None:
+    """Raise InputError unless ``slope`` is the derivative of a function, or of its values."""
     # ``what`` and ``of`` are names of derivative and function; ``noise`` is the round-off of a
-    # difference.
+    # difference. Values are those of :func:`along`.
+    if callable(values):
+        values = along(values)
     change, slope = np.ravel(values[2] - values[0]), 2.0 * np.ravel(slope)
     off = np.abs(change - slope)
     if noise is None:

@@ -14,7 +14,7 @@ import numpy as np
 from skfem.assembly.form.form import Form
 from skfem.generic_utils import OrientedBoundary
 
-from .errors import CallError, ImmutableError, InputError, NameUnknown, require_options
+from .errors import CallError, ImmutableError, NameUnknown, refuse, require_options
 
 # pickles of scikit-fem's objects in attributes of the package's, without changing its classes
 
@@ -175,9 +175,8 @@ def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
         return type(thing)(*given.get(inspect.Parameter.VAR_POSITIONAL, ()), **others, **given.get(
             inspect.Parameter.VAR_KEYWORD, {}))
     missing = [name for name in names if name not in changes and not hasattr(thing, name)]
-    if missing:
-        raise InputError(f"{thing!r} does not store its argument {missing[0]!r}: store it as an "
-                         "attribute of that name, or pass it to replace")
+    refuse(missing, "{!r} does not store its argument {[0]!r}: store it as an attribute of that "
+           "name, or pass it to replace", thing, missing)
     return type(thing)(**{name: getattr(thing, name) for name in names if name not in changes},
                        **changes)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import Array, InputError, gauss, read_only, refuse, require_integer
+from ..core import Array, gauss, read_only, refuse, require_integer
 from ..equations.system import System
 from .base import Motion, Scheme, derivative, difference_row, grown
 from .stage_tangent import Method
@@ -89,10 +89,9 @@ class Collocation(Scheme):
         return f"<{type(self).__name__}, {len(self.points)} points>"
 
     def require(self, system: System) -> None:
-        if system.forces.changing:
-            raise InputError(f"{self!r} does not take {system.forces.changing[0][0]!r}, whose "
-                             "stiffness has entries that change from step to step: use "
-                             "'energy-momentum' or 'generalized-alpha'")
+        refuse(system.forces.changing, "{!r} does not take {[0][0]!r}, whose stiffness has entries "
+               "that change from step to step: use 'energy-momentum' or 'generalized-alpha'", self,
+               system.forces.changing)
         refuse(system.constraints.m and not (self.joined or system.backend.tables.linear_joints),
                "{!r} loses its order with joints that turn or move, and with rigid bodies: use "
                "'radau', or 'energy-momentum', which conserves energy with them", self)

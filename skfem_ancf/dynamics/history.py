@@ -12,8 +12,7 @@ import numpy as np
 from ..actions.forces.springs import Turns
 from ..actions.joints.base import Joint
 from ..beam import Domain, WhichBeam, WhichMember, require_body
-from ..core import (Array, ArrayLike, InputError, Place, StrPath, refuse, require_finite,
-                    require_index, shown)
+from ..core import Array, ArrayLike, Place, StrPath, refuse, require_finite, require_index
 from ..equations.system import System
 from ..core.progress import progress_bar
 from ..io import PvdWriter, to_xarray
@@ -154,9 +153,9 @@ class History(MaterialPoints, SpringForces):
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
         """Iterate over the states with these numbers; all by default."""
-        if instants is not None and (isinstance(instants, (str, bytes, dict, set))
-                                     or not hasattr(instants, "__iter__")):
-            raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
+        refuse(isinstance(instants, (str, bytes, dict, set)) or not (
+            instants is None or hasattr(instants, "__iter__")),
+            "instants must be a list of their numbers, got {!r}", instants)
         return self._states(range(len(self)) if instants is None else [
             require_index("instants", k, len(self)) for k in instants])
 
@@ -330,9 +329,8 @@ class History(MaterialPoints, SpringForces):
         first, last = self.t[0], self.t[-1]
         wanted = np.linspace(first, last, STROBES) if times is None else np.ravel(
             require_finite("times", times))
-        if not len(wanted) or wanted.min() < first or wanted.max() > last:
-            raise InputError(f"times must be instants of the motion, from {first:g} to {last:g}, "
-                             f"at least one; got {shown(times)}")
+        refuse(not len(wanted) or wanted.min() < first or wanted.max() > last, "times must be "
+               "instants of the motion, from {:g} to {:g}; got {!r}", first, last, times)
         instants = np.unique(np.argmin(np.abs(self.t - wanted[:, None]), axis=1))
         return plot_state(list(self.states(instants)), field, ax, thickness=thickness,
                           undeformed=undeformed, colorbar=colorbar, cmap=cmap, limits=limits,
@@ -378,10 +376,8 @@ class History(MaterialPoints, SpringForces):
                 for part in parts:
                     values = values.reshape(len(values), -1)
                     values = values[:, require_index("component", part, values.shape[1])]
-                if values.ndim != 1:
-                    raise InputError(
-                        f"the sensor {sensor!r} reads numbers of shape {values.shape[1:]}: give a "
-                        f"pair of its name and a component, as ({sensor!r}, 1)")
+                refuse(values.ndim != 1, "the sensor {!r} reads numbers of shape {}: give its name "
+                       "and a component, as ({!r}, 1)", sensor, values.shape[1:], sensor)
             curves.append(values)
             labels.append(text if label is None else label)
         return plot_curve(curves[0], curves[1], ax, xlabel=labels[0], ylabel=labels[1], title=title,

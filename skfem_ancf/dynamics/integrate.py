@@ -146,16 +146,14 @@ def _go(run, file, progress):
 def _read(path: StrPath) -> dict[str, Any]:
     """The groups of arrays of a checkpoint, and its single arrays, by name."""
     path = require_path("checkpoint", path, (".npz",))
-    if not path.exists():
-        raise CheckpointError(f"there is no file {str(path)!r}")
+    refuse(not path.exists(), "there is no file {!r}", str(path), error=CheckpointError)
     try:
         arrays = read(path)
     except (OSError, Unreadable) as error:
         raise CheckpointError(f"{str(path)!r} cannot be read, it is not a checkpoint or damaged: "
                               f"{error}") from None
-    if str(arrays.get("format")) != FORMAT:
-        raise CheckpointError(f"{str(path)!r} is not a checkpoint of a motion, or not of this "
-                              f"version, which reads {FORMAT!r}")
+    refuse(str(arrays.get("format")) != FORMAT, "{!r} is not a checkpoint of a motion, or not of "
+           "this version, which reads {!r}", str(path), FORMAT, error=CheckpointError)
     found: dict[str, Any] = {"task": {}, "run": {}, "now": {}, "history": {}, "memory": {},
                              "sensor": {}}
     for name, x in arrays.items():
@@ -180,11 +178,10 @@ class Checkpoint:
             except CheckpointError as error:
                 raise CheckpointError(f"{error}; it is not overwritten: choose another name"
                                       ) from None
-            if not there["done"]:
-                raise CheckpointError(
-                    f"{str(self.path)!r} holds a run up to t = {there['now']['t']:.6g} of "
-                    f"{there['task']['t_end']:.6g}: scene.resume({str(self.path)!r}) continues it; "
-                    "delete the file to start again")
+            refuse(not there["done"], "{!r} holds a run up to t = {:.6g} of {:.6g}: "
+                   "scene.resume({!r}) continues it; delete the file to start again",
+                   str(self.path), there["now"]["t"], there["task"]["t_end"], str(self.path),
+                   error=CheckpointError)
         try:
             self._write()
         except OSError as error:
@@ -226,19 +223,17 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
     try:
         name, values = json.loads(found["scheme"])
         if scheme is None or scheme == "auto":  # the file has the scheme that "auto" chose
-            if name not in SCHEMES:
-                raise CheckpointError(f"the run used a custom scheme, {name!r}: pass it, "
-                                      "resume(path, scheme=...)")
+            refuse(name not in SCHEMES, "the run used a custom scheme, {!r}: pass it, resume(path, "
+                   "scheme=...)", name, error=CheckpointError)
             made = SCHEMES[name].__new__(SCHEMES[name])
             vars(made).update(values)
         else:
             made = get_scheme(scheme)
         q0, text = _identity(system, made)
-        if not np.array_equal(found["q0"], q0):
-            raise CheckpointError("it is from another scene: beams, bodies or their meshes differ")
-        if text != found["scheme"]:
-            raise CheckpointError(f"the file is from a run with {name!r} and {values}, not with "
-                                  f"{made!r}")
+        refuse(not np.array_equal(found["q0"], q0), "it is from another scene: beams, bodies or "
+               "their meshes differ", error=CheckpointError)
+        refuse(text != found["scheme"], "the file is from a run with {!r} and {}, not with {!r}",
+               name, values, made, error=CheckpointError)
         said = {"dt": "auto", "tol": None, "t_eval": None, **found["task"]}
         run = Run(system, made, task_of(**said), sensors)
         run.recorder.load(found["sensor"])

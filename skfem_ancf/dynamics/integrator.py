@@ -224,11 +224,9 @@ class Integrator:
         s = self.system
         along = np.concatenate([member.rigid_motions()[:, 0] for member in s.members])
         gap = np.sqrt(jump @ s.mass.multiply(jump) / (along @ s.mass.multiply(along)))
-        if gap > 1e-8 * s.size:
-            raise SupportError(
-                f"supports would displace the body suddenly by {gap:.3g} on average, at "
-                f"t = {t:.6g}: start from a state that meets them, such as a static solution "
-                "(start=), and move them by continuous functions of time")
+        refuse(gap > 1e-8 * s.size, "supports would displace the body suddenly by {:.3g} on "
+               "average, at t = {:.6g}: start from a state that meets them, as a static solution, "
+               "and move them by continuous functions", gap, t, error=SupportError)
 
     # steps
 

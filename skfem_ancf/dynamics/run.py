@@ -11,9 +11,9 @@ import numpy as np
 import scipy
 
 from ..actions.forces.springs import Turns
-from ..core import (AncfError, Array, CheckpointError, InputError, ModelWarning, ask_number, refuse,
+from ..core import (AncfError, Array, CheckpointError, ModelWarning, ask_number, refuse,
                     require_finite, require_finite_scalar, require_increasing, require_positive,
-                    shown, warn)
+                    warn)
 from ..equations.system import System
 from ..results.state import State
 from .base import COLUMNS, Motion, Scheme, in_blocks, interpolate, same_scheme
@@ -161,17 +161,17 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
     span = require_positive("t_end - t_start", t_end - t_start)
     breaks = [*np.atleast_1d(breakpoints)]
     for control in sampled:
-        if span / control.dt > MAX_STEPS:
-            raise InputError(f"dt of {control!r} is too small for a motion of {span:g}")
+        refuse(span / control.dt > MAX_STEPS, "dt of {!r} is too small for a motion of {:g}",
+               control, span)
         breaks += (t_start + control.dt * np.arange(1, np.ceil(span / control.dt))).tolist()
     auto = isinstance(dt, str)
     refuse(auto and dt != "auto", 'dt must be a positive number or "auto", got {!r}', dt)
     dt = None if auto else require_positive("dt", dt)
     step = 1e-4 * span if auto else min(dt, span)
     # raise InputError if round-off cannot resolve the steps, or if there are too many
-    if step < 1e-100 or t_end > 1e100:  # their squares must not overflow
-        raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
-                         f"{t_end!r}")
+    # the squares of times must not overflow
+    refuse(step < 1e-100 or t_end > 1e100, "times must lie between 1e-100 and 1e100, got dt = "
+           "{!r}, t_end = {!r}", step, t_end)
     refuse(step <= 8 * EPS * max(abs(t_start), abs(t_end)), "dt = {!r} is below the round-off of "
            "the times {!r} to {!r}", step, t_start, t_end)
     steps = (t_end - t_start) / step
@@ -182,8 +182,8 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
              "becomes one step: the first argument is t_end, the second is dt", ModelWarning)
     if t_eval is not None:
         t_eval = require_increasing("t_eval", t_eval)
-        if t_eval[0] < t_start or t_eval[-1] > t_end * (1 + 1e-12):
-            raise InputError(f"t_eval must lie within [{t_start}, {t_end}], got {shown(t_eval)}")
+        refuse(t_eval[0] < t_start or t_eval[-1] > t_end * (1 + 1e-12),
+               "t_eval must lie within [{}, {}], got {!r}", t_start, t_end, t_eval)
     tol = None if tol is None else require_positive("tol", tol)
     rtol = require_positive("rtol", rtol)
     refuse(rtol < MIN_RTOL, "rtol must be at least {:g}, got {!r}", MIN_RTOL, rtol)

@@ -12,9 +12,9 @@ import numpy as np
 from ..actions.joints.base import Joint
 from ..beam import Located, WhichBeam
 from ..core.archive import output_file
-from ..core import (Array, CallbackError, CheckpointError, Immutable, InputError, NameUnknown,
-                    StrPath, ask_array, refuse, require_flag, require_module, require_option,
-                    require_path, shown)
+from ..core import (Array, CallbackError, CheckpointError, Immutable, NameUnknown, StrPath,
+                    ask_array, refuse, require_flag, require_module, require_option, require_path,
+                    shown)
 from ..equations.system import System
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
@@ -66,8 +66,8 @@ class Sensor(Immutable):
         if what == "joint_force":
             refuse(not isinstance(at, Joint), 'a sensor of "joint_force" needs at=joint, one of '
                    'scene.joints, got {!r}', at)
-        elif at is None and what not in CONTACT:
-            raise InputError(f"a sensor of {what!r} needs points of the body: give at=")
+        refuse(at is None and what not in CONTACT, "a sensor of {!r} needs points of the body: "
+               "give at=", what)
 
     @property
     def moving(self) -> bool:
@@ -186,9 +186,8 @@ class Recorder:
         for (name, _), before, values in zip(self.sensors, self._read, found):
             shapes = [np.shape(one) for one in ([before[0][0]] if before else []) + [*values]]
             for shape in shapes:
-                if shape != shapes[0]:
-                    raise CallbackError(f"the function of the sensor {name!r} must return the same "
-                                        f"shape at all times, got {shapes[0]}, then {shape}")
+                refuse(shape != shapes[0], "the sensor {!r} must return the same shape at all "
+                       "times, got {}, then {}", name, shapes[0], shape, error=CallbackError)
             before.append(np.array(values))
 
     def readings(self) -> Readings:
@@ -205,7 +204,6 @@ class Recorder:
 
     def load(self, arrays: dict[str, Array]) -> None:
         """Restore what :meth:`arrays` returned; raises CheckpointError for other sensors."""
-        if len(arrays) != len(self.sensors) + 1:
-            raise CheckpointError(f"the run had {len(arrays) - 1} sensors, the scene has "
-                                  f"{len(self.sensors)}: {[name for name, _ in self.sensors]}")
+        refuse(len(arrays) != len(self.sensors) + 1, "the run had {} sensors, the scene has {}",
+               len(arrays) - 1, [name for name, _ in self.sensors], error=CheckpointError)
         self._t, self._read = [arrays["t"]], [[arrays[str(k)]] for k in range(len(self.sensors))]

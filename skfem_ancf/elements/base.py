@@ -423,8 +423,7 @@ class ElementBeam(Immutable, Element):
             return mesh
         refuse(self.section.number and self.axis_degree > 3 and self._along[0] != self._along[1],
                "{!r} is for straight meshes: axis and sections of a curved one are of one degree. "
-               "Use ElementBeamANCF, ElementBeamANCFHermite or ElementBeamCable", self,
-               error=MeshError)
+               "Use ElementBeamANCF or ElementBeamANCFHermite", self, error=MeshError)
         return mesh.with_sections(self.mesh_sections)
 
     @property

@@ -21,7 +21,7 @@ from ..actions.loads import EndMoment, Load
 from ..actions.tables import MATERIALS, carry_eigenstrains
 from ..beam import Beam, Domain, Points, RigidBody
 from ..beam.kinematics import bent
-from ..core import Array, InputError, cached_property
+from ..core import Array, cached_property, refuse
 from ..core.band import BandMatrix
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
@@ -169,10 +169,9 @@ class System:
         self.forces = self.histories.forces
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
-        if self.damping.stiffness and domains:
-            raise InputError("damping(stiffness=...) acts on strain rates, which the forms of "
-                             f"{domains[0]!r} do not have: give beams damping=KelvinVoigt(time), "
-                             "and the scene damping(modal=...) or damping(mass=...)")
+        refuse(self.damping.stiffness and domains, "damping(stiffness=...) acts on strain rates, "
+               "which the forms of {[0]!r} do not have: give beams damping=KelvinVoigt(time), and "
+               "the scene damping(modal=...) or damping(mass=...)", domains)
         self._rest_modes = rest_modes
         self.items: tuple[Any, ...] | None = None
         self.derivatives: Any = None
@@ -477,9 +476,8 @@ class System:
         return float(load if t is None else t)
 
     def _require_displacement(self, u):
-        if u.shape != (self.N,):
-            raise InputError(f"the displacement must have the shape ({self.N},), got {u.shape}: "
-                             "is it the state of another mesh?")
+        refuse(u.shape != (self.N,), "the displacement must have the shape ({},), got {}: is it "
+               "the state of another mesh?", self.N, u.shape)
 
 
 def _holds(load):

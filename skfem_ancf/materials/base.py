@@ -71,10 +71,8 @@ class Material(Immutable):
         self.nu = require_finite_scalar("nu", nu)
         self.density = None if density is None else _number_or_function("density", density)
         self.plane = require_option("plane", plane, PLANES)
-        if not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")):
-            raise InputError(
-                f"the Poisson ratio nu must lie in (-1, 0.5), or be 0.5 in plane stress, got "
-                f"{nu!r} in plane {plane}")
+        refuse(not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")), "nu must lie "
+               "in (-1, 0.5), or be 0.5 in plane stress, got {!r} in plane {}", nu, plane)
         self.shear_correction = (
             require_option("shear correction", shear_correction, ("auto", "paper"))
             if isinstance(shear_correction, str) else
@@ -191,9 +189,8 @@ class Material(Immutable):
         return law if k_s == 1.0 else ShearCorrected(law, k_s)
 
     def _require_number(self):
-        if callable(self.E):
-            raise InputError(f"the modulus E of {self!r} is a function of material coordinates, "
-                             "which need a Beam. Use replace(E=number)")
+        refuse(callable(self.E), "the modulus E of {!r} is a function of material coordinates, "
+               "which need a Beam. Use replace(E=number)", self)
 
     def _fits(self, name, other="stress"):
         """False if a subclass of the class that defines ``name`` overrides ``other``."""
@@ -313,10 +310,11 @@ def _require_derivatives(law, material):
     except TypeError:
         raise InputError(f"{type(material).__name__}: the derivative of stress cannot be found by "
                          "the complex step: define moduli(strain), too") from None
+    kind = type(material).__name__
     for moduli, name in ((D, "moduli(strain)"), (D.swapaxes(0, 1), "moduli(strain), transposed,")):
-        require_slope(f"{name} of {type(material).__name__}", "stress(strain)",
-                      stress, np.einsum("ij...,j...->i...", moduli, d))
-    require_slope(f"stress(strain) of {type(material).__name__}", "energy(strain)", energy,
+        require_slope(f"{name} of {kind}", "stress(strain)", stress,
+                      np.einsum("ij...,j...->i...", moduli, d))
+    require_slope(f"stress(strain) of {kind}", "energy(strain)", energy,
                   np.sum(stress[1] * d, axis=0))
     lowest, *_, highest = np.linalg.eigvalsh(D0.reshape(3, 3, -1)[..., 0])
     refuse(lowest < -1e-6 * abs(highest), "moduli(strain) of {} at zero strain must not be "

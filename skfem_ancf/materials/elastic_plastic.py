@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import (Array, ArrayLike, InputError, refuse, require_finite, require_finite_scalar,
-                    require_not_negative, require_positive, shown)
+from ..core import (Array, ArrayLike, refuse, require_finite, require_finite_scalar,
+                    require_not_negative, require_positive)
 from .history import ACROSS, HistoryMaterial
 
 #: Newton corrections of a return to the yield surface, and the relative gap at the end.
@@ -117,14 +117,13 @@ class ElasticPlastic(HistoryMaterial):
                    "the result would depend on the mesh, is not included", value)
             return value
         table = require_finite("hardening", hardening, (None, 2))
-        if len(table) < 2 or table[0, 0] != 0.0 or np.any(np.diff(table[:, 0]) <= 0.0) or np.any(
-                np.diff(table[:, 1]) < 0.0):
-            raise InputError(
-                "hardening as a table has rows (plastic strain, yield stress): strains that "
-                f"increase from 0, and stresses that do not decrease; got {shown(table)}")
-        if abs(table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress:
-            raise InputError("the table of hardening begins with the yield stress "
-                             f"{table[0, 1]:g}, and yield_stress is {self.yield_stress:g}")
+        rise = np.diff(table, axis=0)
+        refuse(len(table) < 2 or table[0, 0] != 0.0 or np.any(rise[:, 0] <= 0.0) or np.any(
+            rise[:, 1] < 0.0), "hardening as a table has rows (plastic strain, yield stress), the "
+            "strains increasing from 0 and the stresses not decreasing; got {!r}", table)
+        refuse(abs(table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress, "the table of "
+               "hardening begins with the yield stress {:g}, and yield_stress is {:g}", table[0, 1],
+               self.yield_stress)
         return table
 
     def __repr__(self) -> str:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, ConvergenceError, InputError, Law, along, rebuilt, refuse,
-                    require_integer, require_positive, require_slope)
+from ..core import (Array, ConvergenceError, InputError, Law, rebuilt, refuse, require_integer,
+                    require_positive, require_slope)
 from .base import LinearLaw, Material, hooke
 
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle
@@ -220,14 +220,13 @@ class HistoryMaterial(Material):
             E, d = np.array([[1.3], [-0.7], [0.9]]), np.array([[0.3], [0.7], [-0.6]])
             E, d, zero = SMALL * E, 1e-4 * SMALL * d, np.zeros((self.number, 1))
             S, after = self.stress(E, zero, SOON)
-            if np.shape(S) != E.shape or np.shape(after) != zero.shape:
-                raise InputError(
-                    f"stress(strain, history, dt) of {type(self).__name__} must return arrays of "
-                    f"the shapes of strain and history, {E.shape} and {zero.shape}, got "
-                    f"{np.shape(S)} and {np.shape(after)}")
+            refuse(np.shape(S) != E.shape or np.shape(after) != zero.shape, "stress(strain, "
+                   "history, dt) of {} must return arrays of the shapes of strain and history, "
+                   "{} and {}, got {} and {}", type(self).__name__, E.shape, zero.shape,
+                   np.shape(S), np.shape(after))
             D = self.moduli(E, zero, SOON)
             require_slope(f"moduli(strain, history, dt) of {type(self).__name__}",
                           "stress(strain, history, dt)",
-                          along(lambda s: self.stress(E + s * d, zero, SOON)[0]),
+                          lambda s: self.stress(E + s * d, zero, SOON)[0],
                           np.einsum("ij...,j...->i...", D, d))
             self._consistent = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import Array, ArrayLike, InputError, refuse, require_finite, shown
+from ..core import Array, ArrayLike, refuse, require_finite
 from .base import Material
 from .history import HistoryMaterial
 
@@ -48,9 +48,8 @@ class Prony(HistoryMaterial):
 
     def __init__(self, material: Material, shares: ArrayLike, times: ArrayLike,
                  points: int = 2) -> None:
-        if not isinstance(material, Material) or isinstance(material, HistoryMaterial):
-            raise InputError("material must be an elastic one, such as StVenantKirchhoff(E, nu), "
-                             f"got {shown(material)}")
+        refuse(not isinstance(material, Material) or isinstance(material, HistoryMaterial),
+               "material must be elastic, as StVenantKirchhoff(E, nu), got {!r}", material)
         super().__init__(material.E, material.nu, material.density, material.plane,
                          material.shear_correction, material.thermal_expansion, points,
                          material.strength)

@@ -48,9 +48,8 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
                 lines.append(entity.dxf.layer)
             elif kind == "POINT":
                 points.append((entity.dxf.layer, part.dxf.location.xyz))
-            refuse(kind in CURVES, "{} has {} in the layer {!r}, which is no straight line: "
-                   "explode blocks, and draw curves as polylines", path, kind, entity.dxf.layer,
-                   error=MeshError)
+            refuse(kind in CURVES, "{} has {} in the layer {!r}, no straight line: explode blocks, "
+                   "draw curves as polylines", path, kind, entity.dxf.layer, error=MeshError)
     refuse(not lines, "{} has no lines and no polylines in its model space", path, error=MeshError)
     at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
     at = at * _scale(drawing.units, unit, path)
@@ -155,9 +154,8 @@ def _require_sets_of_abaqus(path):
             elif keyword == "*ELSET":
                 sets.append(name)
         elif keyword == "*ELSET":
-            refuse(re.match(r"\s*[A-Za-z_]", line), "{}: the element set {!r} lists names of sets, "
-                   "which are not read: list the numbers of its elements", path, sets[-1],
-                   error=MeshError)
+            refuse(re.match(r"\s*[A-Za-z_]", line), "{}: the set {!r} lists names of sets, which "
+                   "are not read: list numbers of elements", path, sets[-1], error=MeshError)
     named = [name for name in blocks if name]
     again = sorted({name for name in named + sets if (named + sets).count(name) > 1})
     refuse(again or blocks[:len(named)] != named, "{}: element sets are read if each has one "
@@ -187,8 +185,7 @@ def _names(mesh, blocks, used, wanted):
     groups, found = {}, dict[str, list[Any]]()
     for name, parts in sets.items():
         refuse(len(parts) > len(mesh.cells), "the cell set {!r} has {} parts, the mesh {} blocks "
-               "of cells: it is a set of sets; name the cells themselves", name, len(parts),
-               len(mesh.cells), error=MeshError)
+               "of cells: name cells, not sets", name, len(parts), len(mesh.cells), error=MeshError)
         parts = {k: _entries(name, part, len(mesh.cells[k].data)) for k, part in enumerate(parts)
                  if part is not None}
         some = [blocks[k][part] for k, part in parts.items() if k in blocks and len(part)]
@@ -219,8 +216,7 @@ def _entries(name, part, n):
     except ValueError:  # of sets
         out = np.zeros(1, dtype=object)
     refuse(len(out) and (out.dtype.kind not in "iu" or out.min() < 0 or out.max() >= n), "the set "
-           "{!r} of the mesh must hold numbers from 0 to {}, got {!r}", name, n - 1, part,
-           error=MeshError)
+           "{!r} must hold numbers from 0 to {}, got {!r}", name, n - 1, part, error=MeshError)
     return out.astype(np.int64)
 
 

@@ -169,13 +169,11 @@ class FrameGraph:
         for name in self.beams:
             some = self.groups[name]
             refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: a group is a "
-                       "beam of its own, so a line is in one at most; of the sets of a mesh "
-                       "groups= names those that are beams", some,
-                       np.array(self.beams)[taken[some]], name)
+                       "beam, so a line is in one at most; groups= names the sets of a mesh that "
+                       "are beams", some, np.array(self.beams)[taken[some]], name)
             taken[some] = self.beams.index(name)
             refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
-                   "shorter than tol = {:.3g}, within which points are one node", name, self.tol,
-                   error=MeshError)
+                   "shorter than tol = {:.3g}, and vanish", name, self.tol, error=MeshError)
 
     def _require_points(self):
         n, (a, b) = self.points.shape[1], self.lines
@@ -239,9 +237,8 @@ class FrameGraph:
         self.distinct = np.flatnonzero(self.lines[0] != self.lines[1])
         # move the ends of curves to merged nodes
         for k, curve in self.curves.items():
-            refuse(k not in self.distinct, "the ends of line {}, which has a curve, are not "
-                   "farther apart than tol = {:.3g}, within which points are one node: give a "
-                   "smaller tol=", k, self.tol, error=MeshError)
+            refuse(k not in self.distinct, "the ends of line {}, a curve, are one node within tol "
+                   "= {:.3g}: give a smaller tol=", k, self.tol, error=MeshError)
             shift = (self.points - places)[:, self.given[:, k]]
             if np.any(shift):
                 self.curves[k] = partial(_moved, curve, shift)

@@ -42,9 +42,8 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
     at = a + np.append(PLACES, BETWEEN)[:, None] * (b - a)
     found = ask_array("height(x)", (at.size,), height, at.ravel(), number=True)
     found = found.reshape(at.shape)
-    refuse_any(found.ravel() <= 0.0, "the height of a beam is positive, the function returns "
-               "{:.6g} at {:.6g}: end the mesh before it gets thin there", found.ravel(),
-               at.ravel(), error=MeshError)
+    refuse_any(found.ravel() <= 0.0, "the height of a beam is positive, got {:.6g} at {:.6g}: end "
+               "the mesh before it gets thin there", found.ravel(), at.ravel(), error=MeshError)
     heights, between = found[:4].copy(), found[4:]
     gap = np.max(np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between, axis=0)
     refuse_any(gap > FITS, "the height is not smooth in element {k}, from {:.6g} to {:.6g}: a "

@@ -276,9 +276,8 @@ class MeshBeam(NumberedMesh):
             refuse(np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1),
                    "t must contain node numbers, got {!r}", self.t, error=MeshError)
         shape = np.shape(self.t)
-        refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "a MeshBeam has two nodes per "
-               "element and at least one element, t has shape {}; for quads use mesh.to_meshquad()",
-               shape, error=MeshError)
+        refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "a MeshBeam has elements of two "
+               "nodes, t has shape {}; for quads use mesh.to_meshquad()", shape, error=MeshError)
         super().__post_init__()
         # Basis.refinterp makes meshes without a height
         refuse(self.height is None, "height must be a number, got None: build meshes of beams with "
@@ -493,8 +492,7 @@ class MeshBeam(NumberedMesh):
         size = 0.25 * self.height if size is None else require_positive("size", size)
         growth = require_positive("growth", growth)
         refuse(3.0 * self.height / size > MAX_ELEMENTS, "size = {:g} would make more than {} "
-               "elements of a beam of height {:g}: give a larger one", size, MAX_ELEMENTS,
-               self.height)
+               "elements of height {:g}: give a larger one", size, MAX_ELEMENTS, self.height)
         at = points_of_rows(at)
         if isinstance(at, str) or is_point(at) or not isinstance(at, (tuple, list, set, frozenset)):
             at = [at]

@@ -147,9 +147,8 @@ class NumberedMesh(Immutable, NearMisses, Mesh2D):
             elements = np.nonzero(elements)[0]
         if not elements.size:
             return np.zeros(0, dtype=np.int32)
-        refuse(elements.dtype.kind not in "iu" or elements.ndim != 1, "elements are given by their "
-               "numbers, by the name of a subdomain, by a function or a mask, got {!r}", given,
-               error=MeshError)
+        refuse(elements.dtype.kind not in "iu" or elements.ndim != 1, "elements are numbers, the "
+               "name of a subdomain, a function or a mask, got {!r}", given, error=MeshError)
         refuse_any((elements < 0) | (elements >= self.nelements), "the elements are numbered 0 to "
                    "{}, got {}", self.nelements - 1, elements, error=MeshError)
         return elements

@@ -310,9 +310,8 @@ def facets_of(mesh: Any, place: Place) -> Array:
                "one-dimensional array of integers that is not empty, got {!r}; a place may also be "
                "{}", place, KINDS.rsplit(", or", 1)[0])
         refuse_any((place < 0) | (place >= mesh.nfacets), "the facets are numbered 0 to {}, got "
-                   "{}: 0 to {} are the sections of the nodes, then come the bottom and the top of "
-                   "the {} elements", mesh.nfacets - 1, place, mesh.p.shape[1] - 1, mesh.nelements,
-                   error=MeshError)
+                   "{}: 0 to {} are sections of nodes, then come bottom and top of {} elements",
+                   mesh.nfacets - 1, place, mesh.p.shape[1] - 1, mesh.nelements, error=MeshError)
         return place
     if callable(place):
         x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
@@ -337,8 +336,7 @@ def node_of(mesh: Any, place: Place) -> int:
     """The node of a place that is one section; MeshError for others."""
     facets = np.asarray(facets_of(mesh, place))
     refuse(len(facets) != 1 or facets[0] >= mesh.p.shape[1], "boundary {!r} is not one section of "
-           "the beam; sections are 'left' and 'right', or the point of a node of the axis", place,
-           error=MeshError)
+           "the beam, as 'left', 'right', or the point of a node", place, error=MeshError)
     return int(facets[0])
 
 
@@ -360,9 +358,8 @@ def section_at(mesh: Any, point: ArrayLike) -> int:
         found = found[np.abs(Y[found]) <= finder.from_axis(e, X)[0] + finder.equal]
     if len(found) == 1:
         return int(found[0])
-    if len(found):
-        raise MeshError(f"the point {_pair(x)} is on the sections of the nodes {found.tolist()} at "
-                        "once: name one of them as a boundary, or by np.array([number])")
+    refuse(len(found), "the point {} is on the sections of the nodes {} at once: name one of them "
+           "as a boundary, or by np.array([number])", _pair(x), found.tolist(), error=MeshError)
     k = int(np.argmin(off))
     raise MeshError(
         f"the point {_pair(x)} is on no section between two elements: the nearest is that of node "

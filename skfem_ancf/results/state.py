@@ -19,8 +19,8 @@ from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
 from ..beam import (Beam, BeamPoints, Domain, DomainPoints, RigidBody, WhichBeam, WhichMember,
                     require_body, select_beam, select_member)
 from ..beam.distribution import Distribution, Sampled, station_of_node, stations_of_vector
-from ..core import (Array, Immutable, InputError, NearMisses, Place, cached_property, first_order,
-                    refuse, require_flag, require_integer, require_option, step)
+from ..core import (Array, Immutable, NearMisses, Place, cached_property, first_order, refuse,
+                    require_flag, require_integer, require_option, step)
 from ..equations.evaluation import UNSEEN
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
@@ -258,9 +258,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
         m = system.constraints.m
         multipliers = np.zeros(m) if multipliers is None else multipliers
         for name, value, size in (("u", u, system.N), ("multipliers", multipliers, m)):
-            if np.shape(value) != (size,):
-                raise InputError(f"{name} must have shape ({size},) in this scene, got "
-                                 f"{np.shape(value)}")
+            refuse(np.shape(value) != (size,), "{} must have shape ({},) in this scene, got {}",
+                   name, size, np.shape(value))
         vars(self).update(
             system=system, u=u, load=load, multipliers=multipliers, converged=converged,
             iterations=iterations, message=message, steps=tuple(steps), t=t,

@@ -97,8 +97,7 @@ class LinearModel:
         self.matrices = matrices_of(system, state)
         self._free = system.constraints.free
         refuse(np.any(state.v), "a linear model is about a state at rest, and this one moves: use "
-               "the equilibrium, of a steady rotation that in a rotating frame, see "
-               "skfem_ancf.RotatingFrame")
+               "the equilibrium, of a steady rotation in a RotatingFrame")
         if relaxing := system.histories.relaxing():
             warn(f"a linear model has the stiffness at once of {relaxing[0]!r}, which relaxes in "
                  "time: it is right where all is fast beside that. A motion has all of it, by "

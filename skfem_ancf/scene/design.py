@@ -13,8 +13,8 @@ from scipy.sparse.linalg import spsolve
 
 from ..actions.bound import derivative
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, ask, ask_array, refuse,
-                    require_finite, require_flag, require_function, require_integer, require_module,
-                    require_option)
+                    refuse_any, require_finite, require_flag, require_function, require_integer,
+                    require_module, require_option)
 from ..core.band import NO_FACTORS
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
@@ -390,9 +390,9 @@ class Gradient(Design):
 
     def __init__(self, scene: Any, state: State, wrt: Sequence[Any],
                  readings: Sequence[Any] = ()) -> None:
-        if state.t is not None or state.base is not None:
-            raise InputError("derivatives are of static solutions, and this state is "
-                             + ("linear" if state.t is None else "an instant of a motion"))
+        refuse(state.t is not None or state.base is not None, "derivatives are of static "
+               "solutions, and this state is {}",
+               "linear" if state.t is None else "an instant of a motion")
         self.build: Parameters = Parameters(scene, wrt)
         super().__init__(self.build, readings)
         self._begin(self.build.start, scene, state)
@@ -466,11 +466,8 @@ def _require_pressed(system, u, load, soft):
         moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))
         at = (np.abs(gap) < TOUCH * group.height) & (np.hypot(*push) <= TOUCH * largest) & (
             moves > HELD * moves.max())
-        if at.any():
-            x, y = x[:, at.argmax()]
-            raise InputError(f"a point just touches an obstacle, at ({x:.6g}, {y:.6g}): the "
-                             "derivative depends on whether a change lifts or presses it. Take a "
-                             "load or a place at which it is in contact, or is not")
+        refuse_any(at, "a point just touches an obstacle, at {:.6g}: the derivative depends on "
+                   "whether a change lifts or presses it. Take another load or place", x)
 
 
 def tangent_of(state: State, P: Any) -> Bordered:

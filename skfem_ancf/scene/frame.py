@@ -280,18 +280,16 @@ class Frame(Scene):
         groups = {name: graph.groups[name] for name in graph.beams}
         rest = np.setdiff1d(graph.distinct, np.concatenate([*groups.values(), [-1]]))
         if len(rest):
-            if REST in groups:
-                raise InputError(f"lines {rest[:5].tolist()} are in no group and would be the beam "
-                                 f"{REST!r}, which is the name of a group: name it otherwise")
+            refuse(REST in groups, "lines {} are in no group and would be the beam {!r}, which is "
+                   "the name of a group: name it otherwise", rest[:5].tolist(), REST)
             groups[REST] = rest
         beams = []
         for name, lines in groups.items():
             given = {**options, **sections.get(name, {})}
             if given["height"] is None:
                 given["height"] = getattr(given["section"], "height", None)
-            if given["height"] is None:
-                raise InputError("the lines need a height of their section: give height=, or one "
-                                 f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")
+            refuse(given["height"] is None, "the lines need a height: give height=, or in "
+                   "sections, as {{{!r}: {{'height': 0.1}}}}", name)
             numbers = lines if "height" in sections.get(name, {}) else np.arange(m)
             height = _heights(given.pop("height"), numbers)
             lines = np.intersect1d(lines, graph.distinct)
@@ -387,8 +385,7 @@ class Frame(Scene):
 
     def _require_rigid(self, nodes, advice):
         loose = nodes[~self._nodes.rigid[nodes]]
-        if len(loose):
-            raise InputError(f"all lines are hinged at node {loose[0]}: {advice}")
+        refuse(len(loose), "all lines are hinged at node {[0]}: {}", loose, advice)
 
     def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
         """Fix positions and rotations of nodes, see :meth:`nodes`; hinged lines stay hinged. The
@@ -488,9 +485,9 @@ class Frame(Scene):
     def _bare(self, beams):
         for old, new in zip(self.beams, beams):
             a, b = (beam.mesh.p[:, chain_ends(beam)] for beam in (old, new))
-            if a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.graph.size:
-                raise InputError(f"{new!r} must have a chain for each line of {old!r}, from the "
-                                 "same point to the same point: nodes between them may be others")
+            refuse(a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.graph.size, "{!r} "
+                   "must have a chain for each line of {!r}, from the same point to the same "
+                   "point: nodes between them may be others", new, old)
         frame = type(self)(self.graph, beams, self._lines, self._hinged)
         frame._take(self._entries[0].given)
         return frame
@@ -529,9 +526,8 @@ def _hinged(graph, hinges):
         if isinstance(one, (tuple, list, np.ndarray)) and len(one) == 2:
             line, node = (int(graph.lines_of(one[0])[0]), int(graph.points_at(one[1])[0]))
             at = lines[:, line] == node
-            if not np.any(at):
-                raise InputError(f"line {line} does not end at node {node}: it joins "
-                                 f"{lines[:, line].tolist()}")
+            refuse(not np.any(at), "line {} does not end at node {}: it joins {}", line, node,
+                   lines[:, line].tolist())
             refuse(line not in graph.distinct, "line {} cannot be hinged: its ends are one node, "
                    "as they are not farther apart than tol = {:.3g}", line, graph.tol)
             out[at, line] = True

@@ -25,7 +25,7 @@ from ..actions.pairs import BodyContact
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support
 from ..beam import Beam, Domain, Layout, RigidBody, WhichMember
-from ..core import ArrayLike, InputError, NearMisses, TimeFunction, refuse, require_text, shown
+from ..core import ArrayLike, NearMisses, TimeFunction, refuse, require_text
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh
 
@@ -146,9 +146,8 @@ class Model(NearMisses):
 
     def _bound(self, item):
         """An entry; the scene is not changed."""
-        if not isinstance(item, Item):
-            raise InputError(f"the item must be an Item, as a Spring, a Load or a Joint, got "
-                             f"{shown(item)}: derive yours from skfem_ancf.Item")
+        refuse(not isinstance(item, Item), "the item must be an Item, as a Spring, a Load or a "
+               "Joint, got {!r}: derive yours from skfem_ancf.Item", item)
         bound = [part for one in item.expand(self.layout) for part in one.bound_on(self.layout)]
         numbers = {name: number for name, value in vars(item).items()
                    if isinstance(value, (Beam, tuple, list)) and name[0] != "_"

@@ -15,8 +15,8 @@ from scipy.sparse.linalg import lsqr
 from ..actions.bound import BoundConstraint, BoundForce, MemberForce
 from ..actions.tables import mean_external_force
 from ..beam.kinematics import element_dofs, entries_of
-from ..core import (Array, ArrayLike, InputError, refuse, require_flag, require_integer,
-                    require_option, require_positive)
+from ..core import (Array, ArrayLike, refuse, require_flag, require_integer, require_option,
+                    require_positive)
 from ..dynamics import GeneralizedAlpha, get_scheme
 from ..dynamics.base import Motion, Scheme, in_steps
 from ..dynamics.history import state_of
@@ -128,9 +128,8 @@ class MotionDesign(Design):
                "a history: this scene has contact, friction or a material with a history")
         own = [joint for joint in system.constraints.joints if self.scheme.conserving and (
             type(joint).mean_entries is not BoundConstraint.mean_entries)]
-        if own:
-            raise InputError(f"{own[0]!r} has a Jacobian of its own in steps that conserve energy, "
-                             "without derivatives: use the scheme 'generalized-alpha'")
+        refuse(own, "{[0]!r} has a Jacobian of its own in steps that conserve energy, without "
+               "derivatives: use the scheme 'generalized-alpha'", own)
         for name in self.readings:
             require_option("sensor", name, scene.sensors)
         self._p, self._built, self.state, self._J, self._coloured = p, scene, state, None, {}

@@ -90,9 +90,9 @@ class Parameters:
     def __init__(self, scene: Any, wrt: Sequence[Any]) -> None:
         self._scene, self.each, n = scene, [], 0
         for one in wrt:
-            if not isinstance(one, tuple) or len(one) not in (2, 3):
-                raise InputError("wrt must be a list of (object, name), or of (beam, name, "
-                                 f'"nodes"), as [(beam, "height")], got {shown(one)}')
+            refuse(not isinstance(one, tuple) or len(one) not in (2, 3), "wrt must be a list of "
+                   '(object, name), or of (beam, name, "nodes"), as [(beam, "height")], got {!r}',
+                   one)
             owner, name, field = (*one, "")[:3]
             sizes = 0.0
             if callable(field):
@@ -102,9 +102,8 @@ class Parameters:
             elif name == "nodes" and isinstance(owner, Beam):
                 start, field = owner.mesh.p.copy(), "axis"
                 sizes = 0.1 * owner.mesh.lengths.min()
-                if owner.mesh.curve is None and not owner.mesh.is_straight:
-                    raise InputError(f"the mesh of {owner!r} does not know its curve: make it by "
-                                     "MeshBeam.init_curve or from_points")
+                refuse(owner.mesh.curve is None and not owner.mesh.is_straight, "{!r} does not "
+                       "know its curve: use MeshBeam.init_curve or from_points", owner)
             else:
                 name, start, field = self._number(owner, name)
             self.each.append(Parameter(owner, name, field, start, np.broadcast_to(
@@ -129,17 +128,15 @@ class Parameters:
         value = reduce(_part, path.split("."), owner)
         refuse(path == "mesh.height" and owner.mesh.heights is not None, "the height of {!r} "
                "varies: use the field (beam, 'height', 'nodes')", owner)
-        if not isinstance(owner, Immutable) or value is None:
-            raise InputError(f"{shown(owner)} has no argument {name!r} that can be changed alone; "
-                             "for anything else use a Design with a function that builds the scene")
+        refuse(not isinstance(owner, Immutable) or value is None, "{!r} has no argument {!r} that "
+               "can be changed alone; use a Design with a function", owner, name)
         try:
             timed = callable(value) and isinstance(owner, Item) and not isinstance(value, float)
             return path, np.array(value(1.0) if timed else value, dtype=float), "time" * timed
         except (TypeError, ValueError):
             raise InputError(f"{name!r} of {owner!r} is {shown(value)} and no number, array or "
-                             "function of time: add a function with coefficients to it, as "
-                             f"(object, {name!r}, basis), or use a Design with a function that "
-                             "builds the scene") from None
+                             "function of time: add a function with coefficients, as (object, "
+                             f"{name!r}, basis), or use a Design with a function") from None
 
     def _path(self, owner, name):
         """Where the argument of an object is found, attributes with dots between them."""
@@ -170,16 +167,15 @@ class Parameters:
             old = np.max(np.abs(old(x, 0.0 * x) if callable(old) else old))
             found = basis(x, 0.0 * x)
         found = np.asarray(found, dtype=float)
-        if found.ndim < 2 or found.shape[-1] != len(x):
-            raise InputError(f"the function of {name!r} must return values of k functions, (k, "
-                             f"..., n) for n points, got the shape {found.shape} for {len(x)}")
+        refuse(found.ndim < 2 or found.shape[-1] != len(x), "the function of {!r} must return "
+               "shape (k, ..., n) for n points, got {} for {}", name, found.shape, len(x))
         largest = np.abs(found).reshape(len(found), -1).max(axis=1)
         return path, np.zeros(len(found)), (old or 1.0) / np.where(largest > 0.0, largest, 1.0)
 
     def _field(self, beam, name, field):
         """The values of a field at nodes or in elements."""
-        if not isinstance(beam, Beam) or not any(beam is one for one in self._scene.beams):
-            raise InputError(f"fields are of beams of the scene, got {shown(beam)}")
+        refuse(not any(beam is one for one in self._scene.beams), "fields are of beams of the "
+               "scene, got {!r}", beam)
         require_option("field of a beam", name, FIELD_NAMES)
         mesh, n = beam.mesh, beam.mesh.p.shape[1]
         if name == "height" and mesh.heights is not None:

@@ -143,9 +143,8 @@ class Steps(Immutable):
         """
         for name in values:
             require_option("step", name, self.names)
-        if not values and start is None:
-            raise InputError(f"ramp() has no values: give one at the end of a step, as ramp("
-                             f"{self.names[0]}=1.0)")
+        refuse(not values and start is None, "ramp() has no values: give one at the end of a "
+               "step, as ramp({}=1.0)", self.names[0])
         first: Any = next(iter([*values.values(), start]))
         shape = np.shape(first)
         last: Any = np.zeros(shape) if start is None else require_finite("start", start, shape)
@@ -224,9 +223,8 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     require_flag("stable", stable)
     u = None if start is None else displacement(system, start)
     t_start = 0.0 if start is None else float(start.t or 0.0)
-    if ends[-1] <= t_start:
-        raise InputError(f"the steps end at t = {ends[-1]:g}, which is not after the start at t = "
-                         f"{t_start:g}")
+    refuse(ends[-1] <= t_start, "the steps end at t = {:g}, which is not after the start at t = "
+           "{:g}", ends[-1], t_start)
     made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
     made.t = t_start
     try:

@@ -19,7 +19,7 @@ from ..actions.point_force import PointForce
 from ..beam import Beam, WhichBeam, WhichMember, projected, select_beam
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, Interrupted, NameUnknown,
                     StrPath, ask, ask_field, refuse, require_finite, require_finite_scalar,
-                    require_function, require_label, require_option, require_positive, shown)
+                    require_function, require_label, require_option, require_positive)
 from ..dynamics import Scheme, choose_scheme, get_scheme
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History
@@ -188,9 +188,9 @@ class Scene(Model):
     def _on(self, beams):
         scene = super()._on(beams)
         for k, (v, _) in self._velocities.items():
-            if not callable(v) and scene.layout.members[k].N != self.layout.members[k].N:
-                raise InputError("initial_velocity was given by coordinates and cannot be put on "
-                                 "another mesh: give names or functions")
+            refuse(not callable(v) and scene.layout.members[k].N != self.layout.members[k].N,
+                   "initial_velocity was given by coordinates and cannot be put on another mesh: "
+                   "give names or functions")
             scene.initial_velocity(v, k)
         scene._sensors = self._sensors
         return scene
@@ -239,10 +239,9 @@ class Scene(Model):
             scene = self if beams is None else self._on(beams)
             if loads is None:
                 return scene
-            if not isinstance(loads, (list, tuple)) or not all(isinstance(x, Load) for x in loads):
-                raise InputError("loads must be a list of Loads, as [PointForce((0, -2), at=(1, "
-                                 f"0))], got {shown(loads)}; classes are in "
-                                 "skfem_ancf.actions.loads")
+            given = loads if isinstance(loads, (list, tuple)) else [None]
+            refuse(not all(isinstance(one, Load) for one in given), "loads must be a list of "
+                   "Loads, as [PointForce((0, -2), at=(1, 0))], got {!r}", loads)
             scene = copy(scene)
             # nodes of a frame have no bound parts before it is solved
             scene._entries = tuple(entry for entry in scene._entries if not all(
@@ -343,17 +342,16 @@ class Scene(Model):
                        first_step=first_step, min_step=min_step, progress=progress, stable=stable)
         with self._lock:
             if adapt is None:
-                if (goal, max_elements, max_degree) != (GOALS[0], MOST_ELEMENTS, DEGREES[-1]):
-                    raise InputError("goal=, max_elements= and max_degree= are of an adaptive "
-                                     "solution: give adapt=, its tolerance, too")
+                refuse((goal, max_elements, max_degree) != (GOALS[0], MOST_ELEMENTS, DEGREES[-1]),
+                       "goal=, max_elements= and max_degree= are of an adaptive solution: give "
+                       "adapt=, its tolerance, too")
                 system = self.system
                 u = None if start is None else displacement(system, start)
                 state = solve_static(system, u, system.histories.of_state(start), find)
-            elif start is None:
-                state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)
             else:
-                raise InputError("an adaptive solution begins each mesh from its reference "
-                                 "configuration: give adapt= without start=")
+                refuse(start is not None, "an adaptive solution begins each mesh from its "
+                       "reference configuration: give adapt= without start=")
+                state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)
             warn_of(state)
             return state
 
@@ -483,9 +481,9 @@ class Scene(Model):
             system.forces.contacts.require_path()
             system.forces.contacts.require_clear(np.zeros(system.N), 0.0)
             if branch is not None:
-                if not isinstance(branch, CriticalPoint) or branch.kind != "bifurcation":
-                    raise InputError("branch must be a point of path.critical_points of kind "
-                                     f"'bifurcation', got {shown(branch)}")
+                refuse(not isinstance(branch, CriticalPoint) or branch.kind != "bifurcation",
+                       "branch must be a point of path.critical_points of kind 'bifurcation', got "
+                       "{!r}", branch)
                 refuse(branch.state.system is not system, "the branch point belongs to another "
                        "scene, or to this one before it was changed: follow its path again")
             try:

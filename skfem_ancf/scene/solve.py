@@ -39,9 +39,8 @@ _GEOMETRY = {
 
 def displacement(system: System, state: State, name: str = "start") -> Array:
     """Displacement (N,) of a State for a scene; ``name`` is for messages."""
-    refuse(not isinstance(state, State), "{} is a State, as solve_static returns it, got {}; "
-           "scene.state(u) makes one of coordinates of shape ({},)", name, type(state).__name__,
-           system.N)
+    refuse(not isinstance(state, State), "{} is a State, as of solve_static, got {}; "
+           "scene.state(u) makes one of u of shape ({},)", name, type(state).__name__, system.N)
     other = state.system
     if other is not system:
         refuse(len(other.beams) != len(system.beams), "{} is a state of {} beams, the scene has {}",
@@ -56,15 +55,12 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
             if repr(a.element) != repr(b.element) or not np.array_equal(
                     a.element.doflocs, b.element.doflocs):
                 why = f"its element is {a.element!r}, that of the scene {b.element!r}"
-            if why:  # degrees of freedom of the beam do not fit that of the scene
-                who = "" if len(system.beams) == 1 else f" of beam {b.name or k}"
-                raise InputError(
-                    f"{name} is a state of another mesh{who}: {why}. Its coordinates mean "
-                    "something else here; where they do not, scene.state(other.u) takes them over")
+            refuse(why, "{} is a state of another mesh{}: {}. Its coordinates mean something else "
+                   "here; where they do not, scene.state(other.u) takes them over", name,
+                   f" of beam {b.name or k}" * (len(system.beams) > 1), why)
     places = [[(tuple(b.position), b.angle) for b in s.bodies] for s in (other, system)]
-    if places[0] != places[1]:
-        raise InputError(f"{name} is a state of other rigid bodies: at (position, angle) "
-                         f"{places[0]} there, {places[1]} in the scene")
+    refuse(places[0] != places[1], "{} is a state of other rigid bodies: at (position, angle) {} "
+           "there, {} in the scene", name, places[0], places[1])
     return np.array(require_finite(f"{name}.u", state.u, (system.N,)))
 
 
@@ -74,11 +70,9 @@ def configuration(system: System, state: State) -> State:
     if state.system is system:
         return state
     kinds = [[(type(j), j.equations) for j in s.constraints.joints] for s in (state.system, system)]
-    if kinds[0] != kinds[1]:
-        raise InputError("state has multipliers of other joints: "
-                         f"{list(state.system.constraints.joints)} there, "
-                         f"{list(system.constraints.joints)} in the scene; "
-                         "scene.state(u, multipliers) takes them as they are")
+    refuse(kinds[0] != kinds[1], "state has multipliers of other joints: {} there, {} in the "
+           "scene; scene.state(u, multipliers) takes them as they are",
+           list(state.system.constraints.joints), list(system.constraints.joints))
     memory = system.histories.of_state(state)
     return state.replace(system=system, u=u).replace(memory=memory)
 

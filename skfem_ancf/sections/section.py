@@ -537,8 +537,7 @@ class Layers(Section):
                least, " where it is least" * (mesh.heights is not None))
         if mesh.heights is not None:
             refuse(None not in given, "{!r} has constant thicknesses and does not fill a tapered "
-                   "mesh: give one layer the thickness None, to fill the remaining height, or use "
-                   "a mesh of constant height", self)
+                   "mesh: give one layer the thickness None, to fill the remaining height", self)
             return [layer_of(law, width, Moving(partial(_layer, given, k), mesh.height))
                     for k, (_, law, width) in enumerate(self.parts)]
         tops = np.cumsum([mesh.height - total if x is None else x for x in given])
@@ -672,9 +671,8 @@ class Standard(Section):
     """A profile by its standard name, see :meth:`Section.profile`, with its ``height``."""
 
     def __init__(self, name: str, unit: str = "m", **sizes: float) -> None:
-        refuse(sizes, "{!r} has its sizes by its name, got {}: for others take "
-               'Section.profile("I", width=..., web=..., flange=...)', name, ", ".join(sizes),
-               error=CallError)
+        refuse(sizes, '{!r} has its sizes by its name, got {}: others have Section.profile("I", '
+               'width=..., ...)', name, ", ".join(sizes), error=CallError)
         self.name, self.unit = name, require_option("unit", unit, tuple(LENGTHS))
         self.height, pieces = pieces_of(name, unit)
         self._pieces = [Piece(*piece) for piece in pieces]

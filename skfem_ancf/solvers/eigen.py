@@ -228,9 +228,8 @@ def _unsymmetric(tangent, M, k, shift, small):
         theta, X = eigs(LinearOperator(M.shape, lambda x: inverse.solve(M @ x), dtype=float),
                         k=min(k + 2, n - 2), v0=inverse.solve(start))
     seen = np.abs(theta) > WINDOW * np.abs(theta).max()
-    if np.sum(seen) < k:
-        raise InputError(f"only {int(np.sum(seen))} modes under follower loads exceed round-off, "
-                         f"k = {k} were requested")
+    refuse(np.sum(seen) < k, "only {} modes under follower loads exceed round-off, k = {} were "
+           "requested", int(np.sum(seen)), k)
     values, X = 1.0 / theta[seen] - shift, X[:, seen]
     real = np.abs(values.imag) <= REAL * np.abs(values)
     values[real] = values[real].real
@@ -394,8 +393,7 @@ def _require_no_flutter(system, tangent, Ks, factor):
                 continue
             refuse(np.any(values.imag), "flutter occurs before buckling at the factor {:.6g}, for "
                    "example at {:.3g} times these follower loads: use scene.modes(k, state) about "
-                   "states under load; modes.flutter is True beyond the critical load", factor,
-                   part)
+                   "states under load, and their modes.flutter", factor, part)
     finally:
         tangent.S = S
 

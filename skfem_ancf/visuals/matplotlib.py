@@ -498,8 +498,7 @@ def animate(history: Any, filename: StrPath, field: Any = None, *,
     film = path.suffix.lower() == ".mp4"
     for module in ("imageio", "imageio_ffmpeg") if film else ():
         require_module(module, "view")
-    if not (n := len(history.t)):
-        raise InputError("the history has no instants")
+    refuse(not (n := len(history.t)), "the history has no instants")
     frames = FRAMES if frames is None else require_integer("frames", frames, 1)
     chosen = np.unique(np.round(np.linspace(0, n - 1, min(frames, n))).astype(int))
     figure_class()

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.band import Band
 from ...core.callbacks import handle_of
-from ...core import Array, InputError, refuse, shown
+from ...core import Array, refuse
 from .crossing import CrossingGuard, middle_of
 from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set_rates, touch_of,
                       untouched)
@@ -310,18 +310,14 @@ class Contacts:
             one, deepest = self.obstacles[which], int(np.argmin(gap))
             if given and one.moves:
                 continue
-            if not gap[deepest] >= -cut * group.height:
-                place = (x[:, deepest] + self.origin).tolist()
-                raise InputError(
-                    f"{one!r} cuts the body at the start: the point {shown(place)} of its surface "
-                    f"is {-gap[deepest]:.4g} deep in it. Move the obstacle, or the body to where "
-                    "it is, or give a start= that is clear of it")
+            refuse(not gap[deepest] >= -cut * group.height, "{!r} cuts the body at the start: the "
+                   "point {!r} of its surface is {:.4g} deep in it. Move the obstacle, or the body "
+                   "to where it is, or give a start= that is clear of it", one,
+                   (x[:, deepest] + self.origin).tolist(), -gap[deepest])
             landmarks = self._landmarks(which, t)
             inside = _inside(group, x, landmarks, cut * group.height)
-            if inside is not None:
-                place = (landmarks[:, inside] + self.origin).tolist()
-                raise InputError(f"{one!r} cuts the body at the start: its point {shown(place)} is "
-                                 "inside of it")
+            refuse(inside is not None, "{!r} cuts the body at the start: its point {!r} is inside "
+                   "of it", one, (landmarks[:, inside or 0] + self.origin).tolist())
 
     @cached_property
     def _starts_clear(self):
@@ -338,9 +334,9 @@ class Contacts:
 
     def require_path(self) -> None:
         for one in self.obstacles:
-            if one.friction > 0.0 or one.moves or one.method != "penalty":
-                raise InputError(f"continuation knows obstacles that rest, without friction and by "
-                                 f"penalty, not {one!r}: use solve_static")
+            refuse(one.friction > 0.0 or one.moves or one.method != "penalty", "continuation knows "
+                   "obstacles that rest, without friction and by penalty, not {!r}: use "
+                   "solve_static", one)
 
     def require_penalty(self, scheme: Any, kick: float) -> None:
         """Raise InputError if the augmented Lagrangian is unstable with a scheme."""

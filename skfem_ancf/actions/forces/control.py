@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...beam import Layout, RigidBody, WhichBeam
-from ...core import (Array, InputError, ask_array, ask_number, require_function, require_option,
-                     require_positive, shown)
+from ...core import (Array, InputError, ask_array, ask_number, refuse, require_function,
+                     require_option, require_positive, shown)
 from ...mesh.places import is_point
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol
@@ -75,9 +75,7 @@ class Control(ForceElement):
         self.kind = require_option("kind", kind, KINDS)
         self.points, self.sections = _named("points", points), _named("sections", sections)
         both = {name for name, _ in self.points} & {name for name, _ in self.sections}
-        if both:
-            raise InputError(f"points and sections must have different names, got {sorted(both)} "
-                             "in both")
+        refuse(both, "points and sections must have different names, got {} in both", sorted(both))
         self.dt = None if dt is None else require_positive("dt", dt)
 
     def bind(self, layout: Layout) -> list[Vector]:
@@ -87,9 +85,8 @@ class Control(ForceElement):
             ends.append(Vector(ends[0].start) if self.other is None else find(layout, self.other))
         elif self.other is not None:
             ends.append(find(layout, self.other))
-        if not ends[0].weights.size:
-            raise InputError(f"a control acts on a material point, there is none at "
-                             f"{shown(self.at)}")
+        refuse(not ends[0].weights.size, "a control acts on a material point, there is none at "
+               "{!r}", self.at)
         places = [self._point(layout, place) for _, place in self.points]
         directions = [self._section(layout, place) for _, place in self.sections]
         self._ends = len(ends)

@@ -510,9 +510,8 @@ class Slot(ComposedJoint):
             raise InputError(f"{self!r}: a point cannot slide along a line of its beam or body")
         gap = cross(self.direction, w.start)
         size = max(layout.beam(k).size for k in (which, self.on) if k != GROUND)
-        if abs(gap) > 1e-6 * size:
-            raise InputError(f"{self!r}: the point ({p.start[0]:.6g}, {p.start[1]:.6g}) "
-                             f"is {abs(gap):.6g} off the line: give another through=")
+        refuse(abs(gap) > 1e-6 * size, "{!r}: the point ({:.6g}, {:.6g}) is {:.6g} off the line: "
+               "give another through=", self, p.start[0], p.start[1], abs(gap))
         kept = [(w, self.direction)] if d is None else [(w, self.direction), (d, d.start)]
         self.parts = [aligned(vector, e, rotation(angle_to(start, e.start)))
                       for vector, start in kept]

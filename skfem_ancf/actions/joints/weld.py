@@ -14,8 +14,8 @@ from skfem.helpers import dot
 from ...beam import Beam, BeamPoints, Domain, Layout, RigidBody, WhichBeam, WhichMember, on_body
 from ...beam.kinematics import plane
 from ...core import (Array, ArrayLike, InputError, MeshError, Place, TimeFunction, ask_number,
-                     require_finite_scalar, require_flag, require_function, require_label, sample,
-                     shown)
+                     refuse, require_finite_scalar, require_flag, require_function, require_label,
+                     sample, shown)
 from ...mesh.places import facets_of, is_point, node_of
 from ..item import Item
 from ..loads import EndMoment
@@ -433,9 +433,8 @@ class Motor(Item):
                  other: Any = None) -> None:
         given = [name for name, value in (("angle", angle), ("speed", speed), ("torque", torque))
                  if value is not None]
-        if len(given) != 1:
-            raise InputError("a motor has an angle, a speed or a torque: give one of them, got "
-                             f"{given or 'none'}")
+        refuse(len(given) != 1, "a motor has an angle, a speed or a torque: give one of them, got "
+               "{}", given or 'none')
         self.at = both_of("at", at)
         self.other = None if other is None else both_of("other", other)
         self.torque = torque if torque is None or callable(torque) else (

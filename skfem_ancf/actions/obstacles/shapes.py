@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...core import (Array, ArrayLike, CallbackError, Immutable, InputError, ask, refuse,
-                     require_direction, require_finite, require_flag, require_function,
-                     require_not_negative, require_positive, shown, warnings_as_errors)
+                     refuse_any, require_direction, require_finite, require_flag, require_function,
+                     require_not_negative, require_positive, warnings_as_errors)
 from ..contact.gap import outline
 from ..contact.tables import CUSTOM, OUTLINE
 from ..item import takes_time
@@ -264,11 +264,8 @@ def _require_simple(points):
     """Raise InputError for repeated corners or intersecting sides."""
     n = len(points)
     sides = np.roll(points, -1, axis=0) - points
-    short, = np.nonzero(np.hypot(*sides.T) <= 1e-12 * np.abs(points).max())
-    if len(short):
-        raise InputError(f"the corner {short[0]} of the polygon, {_pair(points[short[0]])}, and "
-                         "the next are one place: leave one of them out")
-
+    refuse_any(np.hypot(*sides.T) <= 1e-12 * np.abs(points).max(), "the corner {k} of the polygon, "
+               "{:g}, and the next are one place: leave one of them out", points.T)
     for i in range(n):
         for j in range(i + 1, n):
             a, b, c, d = points[i], points[(i + 1) % n], points[j], points[(j + 1) % n]
@@ -322,8 +319,8 @@ class SignedDistance(Shape):
         self.f = require_function("f", f, "of x and y that returns distances")
         self.gradient, self.hessian = gradient, hessian
         for name, function in (("gradient", gradient), ("hessian", hessian)):
-            if function is not None:
-                require_function(name, function, "of x and y that returns derivatives")
+            refuse(function and not callable(function), "{} must be a function of x and y that "
+                   "returns derivatives, got {!r}", name, function)
         self.pivot = require_finite("pivot", pivot, (2,))
         self._timed = {name: takes_time(g) for name, g in (
             ("f", f), ("gradient", gradient), ("hessian", hessian))}
@@ -336,14 +333,13 @@ class SignedDistance(Shape):
         value = np.asarray(value)
         if name == "f" and value.ndim == 0 and x[0].ndim == 0:
             pass
-        elif value.shape != (*rows, *x.shape[1:]):
-            raise CallbackError(
-                f"{name}(x, y) of a SignedDistance must return the shape {(*rows, *x.shape[1:])} "
-                f"for x and y of the shape {x.shape[1:]}, got {value.shape}: write it for arrays, "
-                "as np.hypot(x, y) - 1.0")
-        if value.dtype.kind not in "fiuc" or not np.all(np.isfinite(value)):
-            raise CallbackError(f"{name}(x, y) of a SignedDistance must be finite numbers, got "
-                                f"{shown(value)}")
+        else:
+            refuse(value.shape != (*rows, *x.shape[1:]), "{}(x, y) of a SignedDistance must return "
+                   "the shape {} for x and y of the shape {}, got {}: write it for arrays, as "
+                   "np.hypot(x, y) - 1.0", name, (*rows, *x.shape[1:]), x.shape[1:], value.shape,
+                   error=CallbackError)
+        refuse(value.dtype.kind not in "fiuc" or not np.all(np.isfinite(value)), "{}(x, y) of a "
+               "SignedDistance must be finite numbers, got {!r}", name, value, error=CallbackError)
         return value
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
@@ -383,19 +379,18 @@ class SignedDistance(Shape):
         rough = made._differences(x, 0.0)
         steep = np.hypot(*rough)
         worst = int(np.argmax(steep))
-        if steep[worst] > 1.0 + STEEP:
-            raise CallbackError(
-                f"f(x, y) of a SignedDistance must be a distance, whose slope is 1: at "
-                f"{shown(x[:, worst].tolist())} it is {steep[worst]:.4g}. Divide it by its slope, "
-                "or by a bound of it")
+        refuse(steep[worst] > 1.0 + STEEP, "f(x, y) of a SignedDistance must be a distance, whose "
+               "slope is 1: at {!r} it is {:.4g}. Divide it by its slope, or by a bound of it",
+               x[:, worst].tolist(), steep[worst], error=CallbackError)
         if made.gradient is None:
             with suppress(CallbackError, TypeError, ValueError, _COMPLEX), (
                     warnings_as_errors(_COMPLEX)):
                 made._by_steps = bool(np.allclose(made._complex_steps(x, 0.0), rough, rtol=0.0,
                                                   atol=1e-4))
-        elif not np.allclose(made._slope(x, 0.0), rough, rtol=0.0, atol=1e-3):
-            raise CallbackError("gradient(x, y) of a SignedDistance is not that of f: they differ "
-                                f"by {np.abs(made._slope(x, 0.0) - rough).max():.3g}")
+        else:
+            off = np.abs(made._slope(x, 0.0) - rough).max()
+            refuse(off > 1e-3, "gradient(x, y) of a SignedDistance is not that of f: they differ "
+                   "by {:.3g}", off, error=CallbackError)
         made.derivatives(x, 0.0)
         return made
 

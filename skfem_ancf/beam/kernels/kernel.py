@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, InputError, cached_property
+from ...core import Array, cached_property, refuse
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements
@@ -50,9 +50,8 @@ class ElementKernel:
         return out
 
     def _checked(self, u):
-        if u.shape != (self.N,):
-            raise InputError(f"the displacement of this beam must have the shape ({self.N},), got "
-                             f"{u.shape}: is it the state of another mesh?")
+        refuse(u.shape != (self.N,), "the displacement of this beam must have the shape ({},), "
+               "got {}: is it the state of another mesh?", self.N, u.shape)
         return u if u.dtype.kind == "c" else np.ascontiguousarray(u, dtype=float)
 
     @property
