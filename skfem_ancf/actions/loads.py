@@ -236,8 +236,9 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
-        raise InputError(f"{load!r} does not fit this beam: {error}. Meshes change: compute arrays "
-                         "of the size of a mesh in bind(beam) or force(u)") from None
+        raise InputError(f"{load!r} does not fit this beam: {error}. Meshes change, by adapt= and "
+                         "refinement: compute arrays of their size in bind(beam) or force(u)"
+                         ) from None
     except Exception as error:  # user-defined loads may raise anything
         raise InputError(f"{load!r} fails in the reference configuration: {type(error).__name__}: "
                          f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "

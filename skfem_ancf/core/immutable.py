@@ -14,7 +14,7 @@ import numpy as np
 from skfem.assembly.form.form import Form
 from skfem.generic_utils import OrientedBoundary
 
-from .errors import CallError, ImmutableError, NameUnknown, refuse, require_options
+from .errors import CallError, ImmutableError, refuse, require_option, require_options
 
 # pickles of scikit-fem's objects in attributes of the package's, without changing its classes
 
@@ -165,9 +165,9 @@ def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
                and isinstance(getattr(thing, a.name, None), (tuple, dict))]
     if any(a.kind == a.VAR_KEYWORD for a in arguments):
         names += [name for name in more if name not in names]
+    known = names + [a.name for a in several]
     for name in changes:
-        if name not in names + [a.name for a in several]:
-            raise NameUnknown(f"argument of {type(thing).__name__}", name, names)
+        require_option(f"argument of {type(thing).__name__}", name, known)
     if several:  # the constructor takes *parts or **sizes, and stores them
         given = {a.kind: changes.get(a.name, getattr(thing, a.name)) for a in several}
         others = {name: changes.get(name, getattr(thing, name, None)) for name in names

@@ -66,15 +66,10 @@ def product_rule(axis: Rule, section: Rule) -> Rule:
 
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
     """Lagrange polynomials of nodes (n,) at points (m,), shape (m, n)."""
-    nodes, x = np.asarray(nodes, dtype=float), np.asarray(x, dtype=float)
+    nodes, x = np.asarray(nodes, dtype=float), np.atleast_1d(x)
     refuse(len(set(nodes.tolist())) < nodes.size, "nodes must be different, got {!r}", nodes)
-    out = np.empty((x.size, nodes.size))
-    out[:] = 1.0
-    for i, a in enumerate(nodes):
-        for j, b in enumerate(nodes):
-            if i != j:
-                out[:, i] *= (x - b) / (a - b)
-    return out
+    others = [(a, np.delete(nodes, i)) for i, a in enumerate(nodes)]
+    return np.array([np.prod((x[:, None] - b) / (a - b), axis=1) for a, b in others]).T
 
 
 @lru_cache

@@ -28,16 +28,9 @@ def compiled_off() -> str | None:
         return f"{VARIABLE}=0"
     if "NUMBA_DISABLE_JIT" in os.environ and os.environ["NUMBA_DISABLE_JIT"] not in ("", "0"):
         return "NUMBA_DISABLE_JIT is set"
-    return None if _installed() else "Numba is not installed: pip install skfem-ancf[fast]"
+    # without importing Numba, which is slow
+    installed = sys.modules["numba"] is not None if "numba" in sys.modules else _found("numba")
+    return None if installed else "Numba is not installed: pip install skfem-ancf[fast]"
 
 
-def _installed() -> bool:
-    """True if Numba is installed, without importing it, which is slow."""
-    if "numba" in sys.modules:
-        return sys.modules["numba"] is not None
-    return _found()
-
-
-@cache
-def _found() -> bool:
-    return find_spec("numba") is not None
+_found = cache(find_spec)

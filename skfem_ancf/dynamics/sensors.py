@@ -204,6 +204,7 @@ class Recorder:
 
     def load(self, arrays: dict[str, Array]) -> None:
         """Restore what :meth:`arrays` returned; raises CheckpointError for other sensors."""
-        refuse(len(arrays) != len(self.sensors) + 1, "the run had {} sensors, the scene has {}",
-               len(arrays) - 1, [name for name, _ in self.sensors], error=CheckpointError)
+        names = [name for name, _ in self.sensors]
+        refuse(len(arrays) != len(names) + 1, "the run had {} sensors, the scene has {}: {}",
+               len(arrays) - 1, len(names), names, error=CheckpointError)
         self._t, self._read = [arrays["t"]], [[arrays[str(k)]] for k in range(len(self.sensors))]

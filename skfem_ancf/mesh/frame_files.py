@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (MeshError, refuse, refuse_any, require_finite, require_kind, require_module,
-                    require_names, require_option, require_path)
+from ..core import (MeshError, lagrange, refuse, refuse_any, require_finite, require_kind,
+                    require_module, require_names, require_option, require_path)
 from ..core.archive import reading
 from .frame_graph import FrameGraph
 
@@ -241,6 +241,4 @@ def _numbered(mesh, wanted):
 def _polynomial(points, s):
     """Polynomial through ends at s = 0 and 1 and equidistant points (2, n - 2) between."""
     n = points.shape[1]
-    t, k = (n - 1) * np.asarray(s)[..., None], np.arange(n)
-    weights = [np.prod((t - k[k != i]) / (i - k[k != i]), axis=-1) for i in k]
-    return np.tensordot(points[:, [0, *range(2, n), 1]], weights, 1)
+    return points[:, [0, *range(2, n), 1]] @ lagrange(np.arange(n), (n - 1) * np.asarray(s)).T

@@ -161,7 +161,13 @@ class FrameGraph:
         self.curves = {require_integer("the number of a line in curves", k, 0, m - 1): curve
                        for k, curve in mapping_of("curves", curves).items()}
         self.given, self.lost = self.lines, dict(lost or {})
-        self._require_points()
+        a, b = self.lines
+        refuse_any((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n), "line {k} joins the points "
+                   "{}, which are numbered 0 to {}", self.lines, n - 1, error=MeshError)
+        refuse_any(a == b, "line {k} has no length: it joins the point {} to itself", a,
+                   error=MeshError)
+        refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line: "
+                   "remove it, or join it to another point", self.points, error=MeshError)
         self._merge(tol)
         self._require_lines()
         self.beams = tuple(self.groups) if beams is None else tuple(beams)
@@ -174,15 +180,6 @@ class FrameGraph:
             taken[some] = self.beams.index(name)
             refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
                    "shorter than tol = {:.3g}, and vanish", name, self.tol, error=MeshError)
-
-    def _require_points(self):
-        n, (a, b) = self.points.shape[1], self.lines
-        refuse_any((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n), "line {k} joins the points "
-                   "{}, which are numbered 0 to {}", self.lines, n - 1, error=MeshError)
-        refuse_any(a == b, "line {k} has no length: it joins the point {} to itself", a,
-                   error=MeshError)
-        refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line: "
-                   "remove it, or join it to another point", self.points, error=MeshError)
 
     def _require_lines(self):
         key = np.sort(self.lines[:, self.distinct], axis=0)

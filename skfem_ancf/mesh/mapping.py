@@ -11,7 +11,7 @@ from skfem.mapping import Mapping
 
 from ..core import (Array, MeshError, ask_array, cached_property, hermite_basis, lagrange, refuse,
                     refuse_any, require_positive)
-from .places import Inverse, InverseOfLines, with_slope
+from .places import Inverse, InverseOfLines, cross, with_slope
 
 #: Interpolation of sections with 1, 2, ... nodal derivatives along X, the 0th included.
 SECTIONS = ("linear", "cubic", "quintic", "septic",
@@ -112,11 +112,6 @@ NOTHING = 2e-14
 THIN = 1e-14
 #: Points of both faces at which folds are detected.
 _FACES = np.array([np.tile(np.linspace(0.0, 1.0, 9), 2), np.repeat([0.0, 1.0], 9)])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """The out-of-plane component of a x b for vectors (2, ...)."""
-    return a[0] * b[1] - a[1] * b[0]
 
 
 class MappingBeam(Mapping):

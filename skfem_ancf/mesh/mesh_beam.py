@@ -276,8 +276,9 @@ class MeshBeam(NumberedMesh):
             refuse(np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1),
                    "t must contain node numbers, got {!r}", self.t, error=MeshError)
         shape = np.shape(self.t)
-        refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "a MeshBeam has elements of two "
-               "nodes, t has shape {}; for quads use mesh.to_meshquad()", shape, error=MeshError)
+        refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "a MeshBeam has two nodes per "
+               "element and at least one element, t has shape {}; for quads use mesh.to_meshquad()",
+               shape, error=MeshError)
         super().__post_init__()
         # Basis.refinterp makes meshes without a height
         refuse(self.height is None, "height must be a number, got None: build meshes of beams with "

@@ -46,7 +46,7 @@ class Inverse:
         #: Minus the cross product of both; the axial coordinate does not depend on the height.
         self.crossed = np.zeros((n + m - 1, axis.shape[2]))
         for k in range(n):
-            self.crossed[k:k + m] -= _cross(self.axis[:, k, None], self.director)
+            self.crossed[k:k + m] -= cross(self.axis[:, k, None], self.director)
         self.largest, self.heights = height, heights
 
     def height(self, e: Any, xi: Array) -> Any:
@@ -62,7 +62,7 @@ class Inverse:
         gap = x - self.start[:, e, None]
         # (point - axis) x director vanishes at the section through the point
         crossed = np.broadcast_to(crossed, (len(crossed), *gap.shape[1:])).copy()
-        crossed[:director.shape[1]] += _cross(gap[:, None], director)
+        crossed[:director.shape[1]] += cross(gap[:, None], director)
         X = np.full(x.shape, 0.5)
         for _ in range(ITERATIONS):
             value, slope = with_slope(crossed, X[0])
@@ -79,7 +79,8 @@ class Inverse:
         return X
 
 
-def _cross(a, b):
+def cross(a: Array, b: Array) -> Array:
+    """The out-of-plane component of a x b for vectors (2, ...)."""
     return a[0] * b[1] - a[1] * b[0]
 
 
@@ -97,7 +98,7 @@ class InverseOfLines(Inverse):
         gap, X = x - self.start[:, e, None], np.empty(x.shape)
         chord, square = self.chord[:, e, None], self.square[e, None]
         X[0] = (chord[0] * gap[0] + chord[1] * gap[1]) / square
-        X[1] = 0.5 + _cross(chord, gap) / (np.sqrt(square) * self.height(e, X[0]))
+        X[1] = 0.5 + cross(chord, gap) / (np.sqrt(square) * self.height(e, X[0]))
         return X
 
 
@@ -310,7 +311,7 @@ def facets_of(mesh: Any, place: Place) -> Array:
                "one-dimensional array of integers that is not empty, got {!r}; a place may also be "
                "{}", place, KINDS.rsplit(", or", 1)[0])
         refuse_any((place < 0) | (place >= mesh.nfacets), "the facets are numbered 0 to {}, got "
-                   "{}: 0 to {} are sections of nodes, then come bottom and top of {} elements",
+                   "{}: 0 to {} are the sections, then come bottom and top of the {} elements",
                    mesh.nfacets - 1, place, mesh.p.shape[1] - 1, mesh.nelements, error=MeshError)
         return place
     if callable(place):
