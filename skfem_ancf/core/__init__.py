@@ -17,4 +17,4 @@ from .immutable import (Immutable, array_cache, cached_property, is_builtin, pac
 from .quadrature import gauss, gauss_lobatto, hermite_basis, lagrange, product_rule, tensor
 from .linear import angle_of, first_order, largest, step, stress_of, unwrapped
 from .source import (C1, C2, C3, F1, F2, F3, I1, I2, I3, MADE, apart, everywhere, indices,
-                     primitive, shaped, source, where)
+                     primitive, room, shaped, source, where)

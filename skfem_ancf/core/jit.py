@@ -22,7 +22,7 @@ from numba.extending import (intrinsic, lower_builtin, lower_getattr_generic, mo
 
 from .callbacks import kept as keeping
 from .code_cache import cannot_keep, can_keep, key, nothing_collected, verified
-from .source import APART, MADE, MARKED, PYTHON, apart
+from .source import APART, MADE, MARKED, PYTHON, apart, room, shaped
 from .words import Words, hints
 
 
@@ -87,9 +87,19 @@ def _register_apart(function, found):
         with builder.if_then(builder.icmp_signed("==", builder.load(place), word(0)), likely=False):
             call_at(cell(_cell(find)[1]), types.FunctionPrototype(types.void, (types.int64,)),
                     [builder.ptrtoint(place, word)])
-        given = [context.cast(builder, *one) for one in zip(args, made.args, takes)]
+        given = [_borrowed(context, builder, kind, context.cast(builder, x, of, kind))
+                 for x, of, kind in zip(args, made.args, takes)]
         result = call_at(place, types.FunctionPrototype(returns, takes), given)
         return context.get_dummy_value() if returns == types.void else result
+
+
+def _borrowed(context, builder, kind, x):
+    """An array without its owner, whose references need not be counted: the caller holds it."""
+    if isinstance(kind, types.Array):  # each view would count up and down, atomically
+        array = context.make_array(kind)(context, builder, x)
+        array.meminfo = context.get_constant_null(types.MemInfoPointer(kind.dtype))
+        x = array._getvalue()
+    return x
 
 
 #: Addresses of the functions that compiled code calls by address, or 0, in arrays of one number.
@@ -181,10 +191,14 @@ def _read(context, builder, record, pointer, name):
         if kind == types.boolean:
             return builder.trunc(load(place(at)), value)
         return load(builder.bitcast(place(at), value.as_pointer()))
+    data = builder.inttoptr(load(place(at)), context.get_data_type(kind.dtype).as_pointer())
+    return _array(context, builder, kind, data, [load(place(at + 1 + k)) for k in range(kind.ndim)])
+
+
+def _array(context, builder, kind, data, shape):
+    """A contiguous array without an owner, whose references need not be counted."""
     array = context.make_array(kind)(context, builder)
-    array.data = builder.inttoptr(load(place(at)), array.data.type)
-    shape = [load(place(at + 1 + k)) for k in range(kind.ndim)]
-    bytes_each = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+    array.data, bytes_each = data, context.get_constant(types.intp, kind.dtype.bitwidth // 8)
     size, strides = context.get_constant(types.intp, 1), []
     for n in reversed(shape):
         strides.insert(0, builder.mul(bytes_each, size))
@@ -234,6 +248,43 @@ def size_of(hint: Any) -> int:
     if isinstance(kind, str):
         return 1 + int(kind[1])
     return 1 if kind in SCALARS else sum(map(size_of, hints(kind)))
+
+
+@type_callable(room)
+def _room(context):
+    return lambda shape: types.Array(types.float64, len(shape), "C")
+
+
+@lower_builtin(room, types.BaseTuple)
+def _on_stack(context, builder, made, args):
+    shape = _numbers(context, builder, made.args[0], args[0])
+    size = shape[0]
+    for n in shape[1:]:
+        size = builder.mul(size, n)
+    data = builder.alloca(context.get_data_type(types.float64), size)
+    data.align = 64
+    return _array(context, builder, made.return_type, data, shape)
+
+
+@type_callable(shaped)
+def _shaped(context):
+    return lambda x, shape: types.Array(x.dtype, len(shape), "C")
+
+
+@lower_builtin(shaped, types.Array, types.BaseTuple)
+def _reshaped(context, builder, made, args):
+    kind, view = made.args[0], made.return_type
+    x = context.make_array(kind)(context, builder, args[0])
+    y = context.make_array(view)(context, builder, _array(
+        context, builder, view, x.data, _numbers(context, builder, made.args[1], args[1])))
+    y.meminfo, y.parent = x.meminfo, x.parent
+    context.nrt.incref(builder, view, y._getvalue())
+    return y._getvalue()
+
+
+def _numbers(context, builder, kind, shape):
+    return [context.cast(builder, builder.extract_value(shape, k), of, types.intp)
+            for k, of in enumerate(kind)]
 
 
 def compiled(function: Any) -> Any:

@@ -236,35 +236,51 @@ def factorize_complex(A, width):
         size = a * a + b * b
         if not size > 0.0 or not size < np.inf:
             return False
+        a, b = a / size, b / size
         for k in range(1, m + 1):
-            re, im, p = at + k, half + at + k, at + k * ld
-            c, d = (A[re] * a + A[im] * b) / size, (A[im] * a - A[re] * b) / size
-            for i in range(m + 1 - k):
+            re, im, p, q = U(at + k), U(half + at + k), U(at + k * ld), U(half + at + k * ld)
+            c, d = A[re] * a + A[im] * b, A[im] * a - A[re] * b
+            for i in range(U(m + 1 - k)):
                 A[p + i] -= c * A[re + i] - d * A[im + i]
-                A[half + p + i] -= c * A[im + i] + d * A[re + i]
-        for k in range(1, m + 1):
-            x, y = A[at + k], A[half + at + k]
-            A[at + k], A[half + at + k] = (x * a + y * b) / size, (y * a - x * b) / size
+                A[q + i] -= c * A[im + i] + d * A[re + i]
+        re, im = U(at), U(half + at)
+        for k in range(I, U(m + 1)):
+            x, y = A[re + k], A[im + k]
+            A[re + k], A[im + k] = x * a + y * b, y * a - x * b
     return True
 
 
 def solve_complex(A, width, x, y):
+    # two columns at once, as above four
     n, half = x.size, A.size // 2
-    ld = half // n
+    ld, last = half // n, n - n % 2
+    for j in range(0, last, 2):
+        p, q, m, t = U(j * ld), U(half + j * ld), min(width, n - 2 - j), U(j + 2)
+        r, s, a, b = p + U(ld), q + U(ld), x[j], y[j]
+        c, d = x[j + 1] - A[p + I] * a + A[q + I] * b, y[j + 1] - A[p + I] * b - A[q + I] * a
+        x[j + 1], y[j + 1] = c, d
+        p, q, r, s = p + J, q + J, r + I, s + I
+        for k in range(U(m)):
+            e, f, g, h = A[p + k], A[q + k], A[r + k], A[s + k]
+            x[t + k] -= e * a - f * b + g * c - h * d
+            y[t + k] -= e * b + f * a + g * d + h * c
     for j in range(n):
-        c, d = x[j], y[j]
-        for k in range(1, min(width, n - 1 - j) + 1):
-            a, b = A[j * ld + k], A[half + j * ld + k]
-            x[j + k] -= a * c - b * d
-            y[j + k] -= a * d + b * c
-    for j in range(n - 1, -1, -1):
         a, b, c, d = A[j * ld], A[half + j * ld], x[j], y[j]
-        size, p, q = a * a + b * b, 0.0, 0.0
-        for k in range(1, min(width, n - 1 - j) + 1):
-            e, f = A[j * ld + k], A[half + j * ld + k]
-            p += e * x[j + k] - f * y[j + k]
-            q += e * y[j + k] + f * x[j + k]
-        x[j], y[j] = (c * a + d * b) / size - p, (d * a - c * b) / size - q
+        size = a * a + b * b
+        x[j], y[j] = (c * a + d * b) / size, (d * a - c * b) / size
+    for j in range(last - 2, -1, -2):
+        p, q, m, t = U(j * ld), U(half + j * ld), min(width, n - 2 - j), U(j + 2)
+        r, s, a, b, c, d = p + U(ld), q + U(ld), x[j], y[j], x[j + 1], y[j + 1]
+        e, f, g, h = p + J, q + J, r + I, s + I
+        for k in range(U(m)):
+            u, v = x[t + k], y[t + k]
+            a -= A[e + k] * u - A[f + k] * v
+            b -= A[e + k] * v + A[f + k] * u
+            c -= A[g + k] * u - A[h + k] * v
+            d -= A[g + k] * v + A[h + k] * u
+        a -= A[p + I] * c - A[q + I] * d
+        b -= A[p + I] * d + A[q + I] * c
+        x[j], y[j], x[j + 1], y[j + 1] = a, b, c, d
 
 
 def solve_dependent(S, b):

@@ -117,7 +117,12 @@ def everywhere(condition):
     return np.all(condition)
 
 
-@source
+def room(shape):
+    """An array for work. Compiled code has it on the stack until the function marked by
+    :func:`apart` ends: not for loops, nor for what grows with the scene."""
+    return np.empty(shape)
+
+
 def shaped(x, shape):
     """A reshaped view of a contiguous array."""
     return x.reshape(shape)

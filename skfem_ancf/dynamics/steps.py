@@ -21,7 +21,7 @@ from ..actions.tables import MATERIALS, add_constraint_rate, carry_eigenstrains,
 from ..beam.strain_energy import body_linearised, body_stress, quadratic
 from ..core.band import clear, copy, dot, solve_joined, subtract_rows
 from ..core.callbacks import call_solver
-from ..core import F1, apart, indices, shaped, source
+from ..core import F1, apart, indices, room, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, LASTING, MIXED, NOT_CONVERGED,
                                      RESTART, REUSED, ROUGH, SLOW, SYMMETRIC, UNSETTLED,
                                      UNSYMMETRIC, judged, noise_of_step)
@@ -193,9 +193,8 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
 @apart("motion", *ALL, returns=int)
 def _iterate(e, matrices, rule, s, w, state):
     """Iterate to the end of a step: DONE or FAILED."""
-    joined, damped, taken = w.m.l.size > 0, matrices.dampers.active > 0, np.empty(1)
-    contacts, stale = e.forces.contacts, not s.kept
-    limits = np.empty(2)
+    joined, damped, taken = w.m.l.size > 0, matrices.dampers.active > 0, room((1,))
+    contacts, stale, limits = e.forces.contacts, not s.kept, room((2,))
     _predict(e, matrices, rule, s, w, state, limits)
     status, left, most = GO_ON, ITERATIONS, AUGMENTED
     _start(e, matrices, rule, s, w, state)

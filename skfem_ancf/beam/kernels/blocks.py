@@ -7,7 +7,7 @@ many arrays in one loop, whose addresses it compares."""
 
 import numpy as np
 
-from ...core import F1, F2, I1, I2, apart, source
+from ...core import F1, F2, I1, I2, apart, room, shaped, source
 from .compiled import W, CompiledTables
 from .law import LINEAR, conserve, law_evaluate
 from .tables import SECTION
@@ -22,15 +22,17 @@ def block(x, first):
 @apart("StrainTables", CompiledTables, int, F1, F2)
 def gather(t, first, u, U):
     """DOFs relative to the left node, scaled; those of no element are zero."""
-    m, start, last = len(U), t.start, min(t.width, len(t.start) - first)
+    m, last, at = len(U), min(t.width, len(t.start) - first), t.start[first:]
     if last < t.width:
         U[:] = 0.0
+    for k in range(m):
+        x, v = U[k], u[2 * k + 2:]
+        for e in range(last):
+            x[e], x[W + e] = v[np.uint64(at[e])], v[np.uint64(at[e] + 1)]
+    x = U[m // 2]
     for e in range(last):
-        v = u[start[first + e]:]
-        for k in range(m):
-            U[k, e], U[k, W + e] = v[2 * k + 2], v[2 * k + 3]
-        U[m // 2, e] -= v[0]
-        U[m // 2, W + e] -= v[1]
+        x[e] -= u[np.uint64(at[e])]
+        x[W + e] -= u[np.uint64(at[e] + 1)]
     if len(t.D) > 0:
         multiply(block(t.D, first), U)
 
@@ -47,15 +49,18 @@ def multiply(C, X):
 @source
 def add_to_nodes(t, first, F, f):
     """Add the forces of elements, scaled."""
-    m, start = len(F), t.start
+    m, last, at = len(F), min(t.width, len(t.start) - first), t.start[first:]
     if len(t.D) > 0:
         multiply(block(t.D, first), F)
-    for e in range(min(t.width, len(start) - first)):
-        v = f[start[first + e]:]
-        for i in range(2):
-            v[i] -= F[m // 2, i * W + e]
-            for k in range(m):
-                v[2 * k + 2 + i] += F[k, i * W + e]
+    for k in range(m):
+        x, v = F[k], f[2 * k + 2:]
+        for e in range(last):
+            v[np.uint64(at[e])] += x[e]
+            v[np.uint64(at[e] + 1)] += x[W + e]
+    x = F[m // 2]
+    for e in range(last):
+        f[np.uint64(at[e])] -= x[e]
+        f[np.uint64(at[e] + 1)] -= x[W + e]
 
 
 @source
@@ -112,7 +117,7 @@ def strains(t, first, d, r, E):
 @apart("cables", F2, F2, F2, F2)
 def cable_strains(rest, d, r, E):
     """Extension and change of curvature; ``rest`` are |r_X| and the curvature of the reference."""
-    n, flat = len(E) // 2, r.reshape(r.size)
+    n, flat = len(E) // 2, shaped(r, (r.size,))
     for p in range(n):
         change, x, h, k, still = d[2 * p], flat[4 * p * W:], E[p], E[n + p], rest[p]
         for e in range(len(h)):
@@ -128,31 +133,30 @@ def cable_strains(rest, d, r, E):
 def directions(t, r, dd, X):
     """Directions in which a change of the rows from r to r + dd changes the strain; returns them.
     They are derivatives without dd. Those of sections are means of the rows."""
-    cable = t.kind != SECTION
+    if t.kind != SECTION:
+        cable_directions(r, dd if len(dd) > 0 else r, min(1.0, len(dd)), X)
+        return X
     if len(dd) == 0:
-        if cable:
-            cable_directions(r, r, X)
-        return X if cable else r
-    part, end = (1.0, np.empty(r.shape)) if cable else (0.5, X)
+        return r
     for g in range(len(r)):
-        a, b, c = r[g], dd[g], end[g]
+        a, b, c = r[g], dd[g], X[g]
         for e in range(len(c)):
-            c[e] = a[e] + part * b[e]
-    if cable:
-        cable_directions(r, end, X)
+            c[e] = a[e] + 0.5 * b[e]
     return X
 
 
-@apart("cables", F2, F2, F2)
-def cable_directions(r, s, X):
-    """Those of the extension, and of the curvature by r_X and r_XX, at each point, from r to s."""
-    start, end, out = r.reshape(r.size), s.reshape(s.size), X.reshape(X.size)
+@apart("cables", F2, F2, float, F2)
+def cable_directions(r, dd, part, X):
+    """Those of the extension, and of the curvature by r_X and r_XX, at each point, from r to ``r +
+    part dd``."""
+    start, change, out = shaped(r, (r.size,)), shaped(dd, (dd.size,)), shaped(X, (X.size,))
     width = r.shape[1] // 2
     for p in range(len(r) // 2):
-        a, b, c = start[4 * p * W:], end[4 * p * W:], out[6 * p * W:]
+        a, b, c = start[4 * p * W:], change[4 * p * W:], out[6 * p * W:]
         for e in range(width):
             x0, y0, u0, v0 = a[e], a[W + e], a[2 * W + e], a[3 * W + e]
-            x1, y1, u1, v1 = b[e], b[W + e], b[2 * W + e], b[3 * W + e]
+            x1, y1 = x0 + part * b[e], y0 + part * b[W + e]
+            u1, v1 = u0 + part * b[2 * W + e], v0 + part * b[3 * W + e]
             one, two = x0 * x0 + y0 * y0, x1 * x1 + y1 * y1
             length, square, x, y = np.sqrt(one) + np.sqrt(two), one + two, x0 + x1, y0 + y1
             h = 1.0 / (one * two * length * square)  # one division is faster than four
@@ -210,7 +214,7 @@ def at_points(t, first, E):
     x = E.copy()
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), x)
-    return np.dot(t.along, x).reshape(3, t.weights.shape[1], t.width)
+    return shaped(np.dot(t.along, x), (3, t.weights.shape[1], t.width))
 
 
 @source
@@ -219,7 +223,7 @@ def from_points(t, first, S, T):
     w = block(t.weights, first)
     for c in range(3):
         multiply(w, S[c])
-    np.dot(t.along.T, S.reshape(3 * len(w), t.width), T)
+    np.dot(t.along.T, shaped(S, (3 * len(w), t.width)), T)
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), T)
 
@@ -237,7 +241,7 @@ def stresses(t, first, E, change, T):
 @apart("laws", CompiledTables, int, F2, F2, F2)
 def law_stresses(t, first, E, change, T):
     """:func:`stresses` of a nonlinear law."""
-    S, x = np.empty((3, t.weights.shape[1], t.width)), at_points(t, first, E)
+    S, x = room((3, t.weights.shape[1], t.width)), at_points(t, first, E)
     law_evaluate(t.law, x, S)
     if len(change) > 0:
         conserve(t.law, x, at_points(t, first, change), S)
@@ -257,7 +261,7 @@ def moduli(t, first, E):
 @apart("laws", CompiledTables, int, F2, F2)
 def law_moduli(t, first, E, H):
     """:func:`moduli` of a nonlinear law."""
-    M = np.empty((9, t.weights.shape[1], t.width))
+    M = room((9, t.weights.shape[1], t.width))
     law_evaluate(t.law, at_points(t, first, E), M)
     between_samples(t, first, M, H)
 
@@ -407,7 +411,7 @@ def add_geometric(t, r, T, w):
 @apart("cables", I1, F2, F2, F2)
 def add_cable_geometric(of, r, T, w):
     """That of extensions and curvatures."""
-    n, flat = len(T) // 2, r.reshape(r.size)
+    n, flat = len(T) // 2, shaped(r, (r.size,))
     for p in range(n):
         x, one, two, N, M = flat[4 * p * W:], w[of[p]], w[of[n + p]], T[p], T[n + p]
         for e in range(len(N)):
@@ -439,7 +443,7 @@ def products(t, first, w, z, K, Z):
 def own_products(G, used, m, rows, w, sign, K):
     """Sums of ``w[p] (G_g G_h^T + sign G_h G_g^T)``, lower halves; skew ones without diagonal."""
     p, width, size = 0, G.shape[1], w.shape[1]
-    v, top = np.empty((m, size)), 1 if sign > 0 else 0
+    v, top = room((m, size)), 1 if sign > 0 else 0
     K[:] = 0.0
     for g in range(len(G) // m):
         v[:] = 0.0
@@ -510,7 +514,7 @@ def add_to_band(start, first, ld, m, K, Z, A):
 def add_matrices(t, first, w, z, constant, ld, A):
     """Add the matrices of coefficients to a lower half."""
     m, n = t.G.shape[1], t.width
-    K, Z = np.empty((m * (m + 1) // 2, 3 * n)), np.empty((m * (m - 1) // 2, n))
+    K, Z = room((m * (m + 1) // 2, 3 * n)), room((m * (m - 1) // 2, n))
     products(t, first, w, z, K, Z)
     if constant > 0 and len(t.K) > 0:
         add(1.0, block(t.K, first), K)

@@ -5,7 +5,7 @@ ns,), or of size 0. Other arrays are as in :mod:`.blocks`."""
 import numpy as np
 
 from ...core.band import add_multiple
-from ...core import F1, F2, I1, apart, source
+from ...core import F1, F2, I1, apart, room, source
 from .blocks import (add, add_forces_of, add_geometric, add_material, add_matrices, at_points,
                      between_samples, block, changes, directions, displaced, from_points, gather,
                      moduli, place, products, put, scale_products, strains, stresses, take, times,
@@ -23,7 +23,7 @@ def run_force(t, u, v, given, out, f):
     if moving:
         du = v.copy()
         add_multiple(-1.0, u, du)
-    work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
+    work, samples = room((3 * m + 4 * R + 3 * R // 2, 2 * t.width)), room((3, ns, t.width))
     U, V, F, rows = work[:m], work[m:2 * m], work[2 * m:3 * m], work[3 * m:]
     d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
     E, C, T, whole = samples[0], samples[1], samples[2], out.size > 0 or given.size == 0
@@ -54,7 +54,7 @@ def run_force(t, u, v, given, out, f):
 def run_linearised(t, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
-    work, samples = np.empty((2 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
+    work, samples = room((2 * m + 4 * R + 3 * R // 2, 2 * t.width)), room((2, ns, t.width))
     U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
     d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
     for first in range(0, len(t.start), W):
@@ -75,11 +75,11 @@ def run_linearised(t, u, du, given, out, f):
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1, int)
 def run_tangent(t, u, given, out, f, A, ld):
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
-    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
+    work, samples = room((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), room((2, ns, t.width))
     U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
     d, r, B, Y = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:]
     terms, skew = t.pattern.products.shape[1], t.pattern.skew.shape[1]
-    w, z = np.empty((terms, 3 * t.width)), np.empty((skew, t.width))
+    w, z = room((terms, 3 * t.width)), room((skew, t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
@@ -104,12 +104,12 @@ def run_unsymmetric(t, u, v, A, ld):
     R, m, ns, n = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], 3 * t.G.shape[0] // 2
     du = v.copy()
     add_multiple(-1.0, u, du)
-    work = np.empty((m + 3 * R + 2 * n, 2 * t.width))
+    work = room((m + 3 * R + 2 * n, 2 * t.width))
     U, d, r, s = work[:m], work[m:m + R], work[m + R:m + 2 * R], work[m + 2 * R:m + 3 * R]
-    E, X, Y = np.empty((ns, t.width)), work[m + 3 * R:m + 3 * R + n], work[m + 3 * R + n:]
+    E, X, Y = room((ns, t.width)), work[m + 3 * R:m + 3 * R + n], work[m + 3 * R + n:]
     terms, skew = t.pattern.products.shape[1], t.pattern.skew.shape[1]
-    w, z = np.empty((terms, 4 * t.width)), np.empty((skew, 4 * t.width))
-    K, Z = np.empty((m * (m + 1) // 2, 4 * t.width)), np.empty((m * (m - 1) // 2, 4 * t.width))
+    w, z = room((terms, 4 * t.width)), room((skew, 4 * t.width))
+    K, Z = room((m * (m + 1) // 2, 4 * t.width)), room((m * (m - 1) // 2, 4 * t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
@@ -193,10 +193,10 @@ def eigen_mean(t, u, v, shift, f):
     """Change of the mean force from u to v by eigenstrains (3, points, ne) of a nonlinear law."""
     R, m, ns, du = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v.copy()
     add_multiple(-1.0, u, du)
-    work, samples = np.empty((m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
+    work, samples = room((m + 4 * R + 3 * R // 2, 2 * t.width)), room((3, ns, t.width))
     U, rows, E, C, T = work[:m], work[m:], samples[0], samples[1], samples[2]
     d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
-    S = np.empty((3, t.weights.shape[1], t.width))
+    S = room((3, t.weights.shape[1], t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         gather(t, first, du, U)
@@ -220,10 +220,10 @@ def run_eigen_force(t, u, v, given, f):
 @apart("eigenstrains", CompiledTables, F1, F1, F1, int)
 def run_eigen_tangent(t, u, given, A, ld):
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
-    U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
-    E, T = np.empty((ns, t.width)), np.empty((ns, t.width))
+    U, d, r = room((m, 2 * t.width)), room((R, 2 * t.width)), room((R, 2 * t.width))
+    E, T = room((ns, t.width)), room((ns, t.width))
     terms, skew = t.pattern.products.shape[1], t.pattern.skew.shape[1]
-    w, z = np.empty((terms, 3 * t.width)), np.empty((skew, t.width))
+    w, z = room((terms, 3 * t.width)), room((skew, t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         w[:] = 0.0

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import F1, F2, I1, I3, apart, indices, source
+from ...core import F1, F2, I1, I3, apart, indices, room, source
 
 TINY = 1e-200
 
@@ -71,7 +71,7 @@ def add_mean_moments(moments, factors, u0, u1, f):
     """Add the mean forces from u0 to u1, whose work is the moments times the rotations."""
     # A couple acts on the angle between its two sections, without resultant moment.
     M, opposite = moments.M, moments.opposite
-    a, b, g = np.empty((4, 1)), np.empty((4, 1)), np.empty((4, 1))
+    a, b, g = room((4, 1)), room((4, 1)), room((4, 1))
     for k in range(M.size):
         other = opposite[k]
         if other < k and other >= 0:
