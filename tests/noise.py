@@ -190,6 +190,6 @@ def alike(a, b):
 
 if __name__ == "__main__":
     install(int(sys.argv[1]))
-    from skfem_ancf.equations.compile import compile_all
+    from skfem_ancf.__main__ import compile_all
 
     compile_all()

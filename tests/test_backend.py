@@ -209,7 +209,7 @@ def test_the_command_says_how_it_is_used():
 
 def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
     from skfem_ancf.core.switch import VARIABLE
-    from skfem_ancf.equations.compile import compile_all
+    from skfem_ancf.__main__ import compile_all
 
     monkeypatch.setenv(VARIABLE, "1")
     compile_all()

@@ -11,7 +11,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam
                         StVenantKirchhoff, Weight)
 from skfem_ancf.core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
                                     SupportError)
-from skfem_ancf.equations import mass_solver
+from skfem_ancf.equations import linear_solver
 
 E, H = 2e11, 0.02
 STEEL = StVenantKirchhoff(E, 0.3, density=7800.0)
@@ -241,7 +241,7 @@ def test_a_portal_frame_buckles_sideways():
 
 def swinging(eliminated, monkeypatch, scheme, n=60, dt=1e-3, **options):
     """A frame of two times two cells, two hinged ends in it, after a step load."""
-    monkeypatch.setattr(mass_solver, "MANY", 0 if eliminated else 10**9)
+    monkeypatch.setattr(linear_solver, "MANY", 0 if eliminated else 10**9)
     frame = square(2, hinges=[(0, 3), (7, 4)]).point_force((3000.0, 0), at="side")
     assert frame.system.mass_solver.by_nodes == eliminated
     return frame.integrate(n * dt, dt, scheme=scheme, **options)
@@ -263,7 +263,7 @@ def test_motion_by_elimination_is_that_by_multipliers(scheme, error, monkeypatch
 
 
 def test_a_frame_swings_in_its_first_mode(monkeypatch):
-    monkeypatch.setattr(mass_solver, "MANY", 0)
+    monkeypatch.setattr(linear_solver, "MANY", 0)
     frame = square(4)
     modes = frame.modes(1)
     period = 2.0 * np.pi / modes.frequencies[0]
@@ -276,7 +276,7 @@ def test_a_frame_swings_in_its_first_mode(monkeypatch):
 
 def test_a_frame_at_rest_under_its_weight_stays_there(monkeypatch):
     """All forces cancel, so that accelerations are round-off: no reason to give up."""
-    monkeypatch.setattr(mass_solver, "MANY", 0)
+    monkeypatch.setattr(linear_solver, "MANY", 0)
     x = np.linspace(0.0, 60.0, 11)
     cable, k = np.column_stack([x, 24.0 * (x / 60.0 - 0.5)**2]), np.arange(10)
     frame = Frame.from_lines(cable, np.column_stack([k, k + 1]), material=STEEL, height=0.05,

@@ -9,7 +9,7 @@ from skfem_ancf import (Beam, CallbackError, Circle, ConvergenceError, ElementBe
                         ModelWarning, NameUnknown, Ramp, Scene, Section, StepHistory, Steps,
                         StVenantKirchhoff, SupportError)
 from skfem_ancf.scene import quasistatic
-from skfem_ancf.solvers.outcome import LoadStepFailed
+from skfem_ancf.solvers.iteration import LoadStepFailed
 
 SOFT = StVenantKirchhoff(2e8, 0.3, 7800)
 

@@ -274,7 +274,7 @@ def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
     global _announced
     names = {name for name in names if not code_cache.on_disk(name)}
     if not names or _announced:
-        yield _nothing
+        yield lambda name: None
         return
     said = (f"compiling once, about {compiling(names):.2g} s, cached in {code_cache.folder()}"
             if code_cache.can_keep() else f"compiling, about {compiling(names):.2g} s")
@@ -290,7 +290,3 @@ def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
             yield update
     finally:
         _announced = False
-
-
-def _nothing(name):  # no announcement
-    pass

@@ -174,10 +174,8 @@ class Constraints:
         return np.concatenate([np.zeros(0), *(joint.value(u, t) for joint in self.joints)])
 
     def _by_tables(self, u, t):
-        (rows, columns, values), offset = self._slopes_at(t), self._still[0]
-        if self.drives:
-            offset = np.concatenate([x.offset(np.array([t]), self.N)[0] for x in self.joints])
-        k, i, j, v = self.seconds
+        (rows, columns, values), (k, i, j, v) = self._slopes_at(t), self.seconds
+        offset = self.offsets(np.array([t]))[0] if self.drives else self._still[0]
         return (offset + np.bincount(rows, values * u[columns], self.m)
                 + 0.5 * np.bincount(k, v * u[i] * u[j], self.m))
 
@@ -212,12 +210,17 @@ class Constraints:
     @cached_property
     def _still(self):
         """Phi in the reference configuration, and whether its Jacobian there is constant."""
-        offset = [joint.offset(np.zeros(1), self.N)[0] for joint in self.joints]
-        return np.concatenate([np.zeros(0), *offset]), not any(j.turning for j in self.joints)
+        return self.offsets(np.zeros(1))[0], not any(j.turning for j in self.joints)
+
+    def offsets(self, times: Array) -> Array:
+        """Phi in the reference configuration at times (n,), shape (n, m)."""
+        return np.hstack([np.zeros((len(times), 0)),
+                          *(joint.offset(times, self.N) for joint in self.joints)])
 
     def _slopes_at(self, t):
-        if self._still[1]:
-            return self.slopes
+        return self.slopes if self._still[1] else self._new_slopes(t)
+
+    def _new_slopes(self, t):
         found = [joint.slope_entries(np.array([t]), self.N) for joint in self.joints]
         return self._in_order((rows, columns, values[0]) for rows, columns, values in found)
 
@@ -251,8 +254,7 @@ class Constraints:
     @cached_property
     def slopes(self) -> tuple[Array, ...]:
         """Entries of :meth:`full_jacobian` in the reference configuration at time 0."""
-        found = [joint.slope_entries(np.zeros(1), self.N) for joint in self.joints]
-        return self._in_order((rows, columns, values[0]) for rows, columns, values in found)
+        return self._new_slopes(0.0)
 
     @cached_property
     def _at_rest(self):

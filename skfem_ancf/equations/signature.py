@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -13,6 +14,8 @@ from scipy.sparse.linalg import splu
 
 from ..core.band import SMALL, Inertia, beside_zero, dense
 from ..core import Array
+
+logger = logging.getLogger(__name__)
 
 #: Relative remainder of a dependent row.
 DEPENDENT = 1e-9
@@ -113,23 +116,14 @@ def inertia_of(A: Array | sparse.csr_array) -> Inertia:
         values = np.linalg.eigvalsh(A / (root[:, None] * root))
         largest = max(1.0, values[-1])  # scale of the round-off
         return beside_zero(lambda shift: int(np.sum(values < -shift * largest)))
-    if is_definite(A):
-        return Inertia(0, False)
-    scale = sparse.diags(1.0 / np.sqrt(size))
+    scale, positive = sparse.diags(1.0 / np.sqrt(size)), np.all(A.diagonal() > 0.0)
     A, one = scale @ A @ scale, sparse.eye(len(size))
-    return beside_zero(lambda shift: int(np.sum(_pivots(A + shift * one) < 0.0)))
-
-
-def is_definite(A: sparse.csr_array) -> bool:
-    """True if a sparse symmetric matrix is positive definite beyond round-off."""
-    size = A.diagonal()
-    if np.any(size <= 0.0):
-        return False
-    scale = sparse.diags(1.0 / np.sqrt(size))
     try:
-        return bool(np.all(_pivots(scale @ A @ scale) > SMALL))
+        if positive and np.all(_pivots(A) > SMALL):
+            return Inertia(0, False)
     except np.linalg.LinAlgError:
-        return False
+        logger.debug("not definite")
+    return beside_zero(lambda shift: int(np.sum(_pivots(A + shift * one) < 0.0)))
 
 
 def diagonal_factors(A: sparse.csc_array, order: str) -> Any:

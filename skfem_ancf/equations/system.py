@@ -29,8 +29,7 @@ from . import evaluation
 from .backend import Backend
 from .constraints import Constraints
 from .histories import Histories
-from .linear_solver import LinearSolver
-from .mass_solver import MassSolver, ModalDamping
+from .linear_solver import LinearSolver, MassSolver, ModalDamping
 
 # energy scales of a scene, for round-off
 

@@ -377,10 +377,7 @@ class Tables:
 
     def offsets(self, times: Array) -> Array:
         """c of all joints at times (n,), shape (n, m)."""
-        s = self.system
-        if not s.constraints.joints:
-            return np.zeros((len(times), 0))
-        return _beside([joint.offset(times, s.N) for joint in s.constraints.joints])
+        return self.system.constraints.offsets(times)
 
     def slopes(self, times: Array) -> Array:
         """g of all joints at times (n,), shape (n, k), or one row if constant."""

@@ -17,8 +17,7 @@ from ..core import (Array, ArrayLike, ConvergenceError, InputError, ask, ask_arr
                     require_module, require_option)
 from ..core.band import NO_FACTORS
 from ..dynamics.sensors import Sensor, locate, read
-from ..equations.matrices import matrices_of
-from ..equations.strain_tangent import Inverse, StrainTangent
+from ..equations.matrices import Inverse, StrainTangent, matrices_of
 from ..results.state import State
 from ..solvers import eigen
 from .control import Bordered, rows_of

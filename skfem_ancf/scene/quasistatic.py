@@ -23,7 +23,7 @@ from ..equations.system import System
 from ..results.state import State
 from ..solvers.increment import Increment, Options, Route
 from ..solvers.newton import Search, Steps as Rules
-from ..solvers.outcome import StaticResult, LoadStepFailed
+from ..solvers.iteration import StaticResult, LoadStepFailed
 from .solve import displacement
 
 logger = logging.getLogger(__name__)

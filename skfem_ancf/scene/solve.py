@@ -22,8 +22,7 @@ from ..equations.system import System
 from ..results.modes import ROUND_OFF, Modes
 from ..results.state import State
 from ..solvers.eigen import improved
-from ..solvers.iteration import ITERATIONS
-from ..solvers.outcome import StaticResult
+from ..solvers.iteration import ITERATIONS, StaticResult
 
 # checks of states and displacements for the equations of a scene
 

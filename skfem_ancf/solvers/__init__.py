@@ -2,6 +2,6 @@
 
 from .continuation import continuation
 from .newton import solve_static
-from .outcome import LoadStep, StaticResult
+from .iteration import LoadStep, StaticResult
 
 __all__ = ["LoadStep", "StaticResult", "continuation", "solve_static"]

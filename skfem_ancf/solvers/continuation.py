@@ -20,7 +20,7 @@ from ..equations.stability import position_weights
 from ..equations.system import System
 from ..results.path import CriticalPoint
 from ..results.state import MaterialPoints, State
-from .outcome import LoadStepFailed
+from .iteration import LoadStepFailed
 
 logger = logging.getLogger(__name__)
 #: Largest number of steps.

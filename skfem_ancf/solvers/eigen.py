@@ -10,13 +10,13 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 from ..core.band import NO_FACTORS, fix
 from ..core import (Array, ConvergenceError, InputError, ModelWarning, SupportError, refuse,
                     require_integer, warn)
-from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
+from ..equations.matrices import Inverse, StrainTangent, is_symmetric
 from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes
 from ..results.state import State
 from .increment import Route
 from .newton import Search, Steps
-from .outcome import LoadStepFailed
+from .iteration import LoadStepFailed
 
 DENSE = 600  # largest number of free DOFs for the dense solver
 WINDOW = 1e-8  # smallest relative eigenvalue that is taken from an inverse

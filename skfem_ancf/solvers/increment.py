@@ -15,9 +15,8 @@ from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
 from . import strategies
 from .iteration import (CONVERGED, INDEFINITE, ITERATIONS, NOT_CONVERGED, NOT_FINITE, SINGULAR,
-                        equilibrium)
-from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
-                      StaticResult, Unstable)
+                        Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
+                        StaticResult, Unstable, equilibrium)
 
 logger = logging.getLogger(__name__)
 

@@ -20,7 +20,7 @@ from ..equations.system import System
 from . import strategies
 from .continuation import continuation
 from .increment import Increment, Options, Route
-from .outcome import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
+from .iteration import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
 from .strategies import MOST_FROM_SOFT
 

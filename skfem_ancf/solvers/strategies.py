@@ -32,7 +32,7 @@ from ..core.callbacks import handle_of
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
                                    position_weights, potential, response, verdict)
 from ..equations.system import System
-from .outcome import Equilibrium, LoadStepFailed, StaticResult
+from .iteration import Equilibrium, LoadStepFailed, StaticResult
 
 logger = logging.getLogger(__name__)
 
