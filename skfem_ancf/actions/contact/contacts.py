@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.band import Band
 from ...core.callbacks import handle_of
-from ...core import Array, refuse
+from ...core import Array, InputError, refuse, shown
 from .crossing import CrossingGuard, middle_of
 from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set_rates, touch_of,
                       untouched)
@@ -316,8 +316,10 @@ class Contacts:
                    (x[:, deepest] + self.origin).tolist(), -gap[deepest])
             landmarks = self._landmarks(which, t)
             inside = _inside(group, x, landmarks, cut * group.height)
-            refuse(inside is not None, "{!r} cuts the body at the start: its point {!r} is inside "
-                   "of it", one, (landmarks[:, inside or 0] + self.origin).tolist())
+            if inside is not None:
+                place = (landmarks[:, inside] + self.origin).tolist()
+                raise InputError(f"{one!r} cuts the body at the start: its point {shown(place)} is "
+                                 "inside of it")
 
     @cached_property
     def _starts_clear(self):
