@@ -284,7 +284,6 @@ class _Page:
                 ((f"{one.value:.3f}",), _pair(one.point), str(one.beam))
                 for one in state.extremes()]) if self.strong else "",
             "<h2>Section forces</h2>" if state.beams else "", self._section_forces(),
-            *self._integrated(),
             "<h2>Findings</h2>", *([_text(text, "bad") for text in findings]
                                    or [_text("None: the solution is within the range of its mesh "
                                              "and materials.")]),
@@ -398,32 +397,29 @@ class _Page:
         if not self.state.beams:
             return ""
         lines, rows = lines_of(self.state, self.state.beams), []
-        size = {name: max(np.max(np.abs(one[name])) for one in lines) for name in "NQM"}
-        size["N"] = size["Q"] = max(size["N"], size["Q"])
-        for name in "NQM":
-            for what, pick in (("maximum", np.argmax), ("minimum", np.argmin)):
-                line = lines[int(pick([one[name][pick(one[name])] for one in lines]))]
-                k = int(pick(line[name]))
-                value = float(line[name][k])
-                value *= abs(value) > ZERO * size[name]
-                rows.append((f"{what} {name}", self.number(value, KINDS[name]),
-                             _pair(line["x"][:, k]), name_of(self.system, line["beam"])))
-        points = np.hstack([line["x"] for line in lines])
-        width, height = np.ptp(points, axis=1) + 2.0 * ROOM * np.max(np.ptp(points, axis=1))
+        x = np.hstack([line["x"] for line in lines])
+        beams = [line["beam"] for line in lines for _ in line["N"]]
+        found = {name: np.concatenate([line[name] for line in lines]) for name in KINDS}
+        force = np.max(np.abs([found["N"], found["Q"]]))
+        for name, values in found.items():
+            size = np.max(np.abs(values)) if name == "M" else force
+            for what, k in (("maximum", np.argmax(values)), ("minimum", np.argmin(values))):
+                value = float(values[k]) * bool(abs(values[k]) > ZERO * size)
+                rows.append((f"{what} {name}", self.number(value, KINDS[name]), _pair(x[:, k]),
+                             name_of(self.system, beams[k])))
+        width, height = np.ptp(x, axis=1) + 2.0 * ROOM * np.max(np.ptp(x, axis=1))
         beside = height > width
         size = (7.0, 4.5) if beside else (6.3, min(9.5, 3.0 * (6.3 * height / width + 0.55)))
         axes = new_axes(size, *((1, 3) if beside else (3, 1)))
-        return _figure(lambda: self.state.plot_resultants(axes=axes, on="structure")[0], "tall"
-                       ) + _table(("", "value", "at", "beam"), rows)
-
-    def _integrated(self):
-        """Notes on section forces that are not those of equilibrium."""
-        for k, (name, why) in enumerate(self.state.recovered.items()):
-            if why and self.state._recovery_of(k, fields=False) is None:
-                yield _text(f"Section forces of beam {name} are integrals of the stress of its "
-                            f"elements, with its errors: {why}." + (
-                                " The exact ones are zero." if why.endswith("no load") else ""),
-                            "note")
+        integrated = (
+            _text(f"Section forces of beam {name} are integrals of the stress of its elements, "
+                  f"with its errors: {why}." + (
+                      " The exact ones are zero." if why.endswith("no load") else ""), "note")
+            for k, (name, why) in enumerate(self.state.recovered.items())
+            if why and self.state._recovery_of(k, fields=False) is None)
+        return "\n".join([
+            _figure(lambda: self.state.plot_resultants(axes=axes, on="structure")[0], "tall")
+            + _table(("", "value", "at", "beam"), rows), *integrated])
 
 
 def _pair(x):

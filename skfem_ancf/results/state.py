@@ -501,7 +501,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
     def _recovery_of(self, k, fields=True):
         """:meth:`recovery` of beam ``k``; with ``fields=False`` section forces suffice."""
         if k not in self._recoveries:
-            mates, known = [one for one in self._mates if k not in one._recoveries], []
+            # states of a motion are recovered together
+            mates, known = [one for one in vars(self).get("_mates", [self])
+                            if k not in one._recoveries], []
             for one in mates:
                 try:
                     known.append((one, one._section_forces(k)))
@@ -606,11 +608,6 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
     @cached_property
     def _recoveries(self):
         return {}
-
-    @cached_property
-    def _mates(self):
-        """States whose fields are recovered together with its own."""
-        return [self]
 
     @cached_property
     def _stations(self):

@@ -311,7 +311,7 @@ class _Step:
         work = max(np.abs(force * s).max(), np.finfo(float).tiny)
         speed = np.full(c.m, self._system.size / self._h)
         return np.concatenate([work / s, speed * self._h, self._h * work / s, speed, work / s,
-                               speed / self._h])
+                               speed / self._h])[:len(self._solver.keep)]
 
     def _linearised(self, to_v, to_a):
         """The factors of the derivatives of the equations by the unknowns."""
@@ -416,10 +416,6 @@ class _MeanStep(_Step):
         return np.concatenate([
             first, c.constraint(y.u, y.t), M(y.v - self._velocity) + J.T @ self._impulse,
             _rate(INSTANT * self._h, system, y.u, y.v, y.t)])
-
-    def magnitudes(self) -> Array:
-        found = super().magnitudes()
-        return found[:2 * len(found) // 3]
 
     def _linearised(self):
         system, y, start, h, c, t = (self._system, self.y, self._begin, self._h,
