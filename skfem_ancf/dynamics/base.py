@@ -16,7 +16,7 @@ from ..equations.system import System
 NEAR = 0.1
 #: Attributes of a Motion that are stored.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
-           "dissipated", "history", "turns")
+           "dissipated", "history", "turns", "start")
 
 
 @dataclass
@@ -47,6 +47,11 @@ class Motion:
         :class:`~skfem_ancf.actions.forces.springs.Turns`.
     memory
         Further data of the scheme for its next step: None, or a dict of numbers and arrays.
+    start
+        Displacement at the start of the last step, and its size, shape (N + 1,), if the forces of
+        contact are means over it; else None.
+    parts
+        The Motions at the ends of the parts of the last step, or None for a whole one.
     """
 
     t: float
@@ -61,6 +66,8 @@ class Motion:
     history: Array | None = None
     turns: Array | None = None
     memory: dict[str, Any] | None = None
+    start: Array | None = None
+    parts: list[Motion] | None = None
 
 
 class Motions(Sequence[Motion]):
@@ -78,8 +85,7 @@ class Motions(Sequence[Motion]):
     def __getitem__(self, k: Any) -> Any:
         row: dict[str, Any] = {
             name: x[k] if x.ndim > 1 else float(x[k]) for name, x in self.columns.items()}
-        if not row["history"].size:
-            row["history"] = None
+        row |= {name: None for name in ("history", "start") if not row[name].size}
         return Motion(**row, memory=self._memory(k))
 
 
@@ -170,6 +176,11 @@ class Scheme:
         """Fraction of a step below which accelerations within it are interpolated. In shorter steps
         a finite difference would consist of round-off."""
         return NEAR
+
+    def acting(self, y: Motion) -> list[tuple[float, Motion]]:
+        """Instants whose forces act in a step that ends at y, or the means of it, each with its
+        time: their sum is the impulse."""
+        return [(y.before, y)]
 
     def lasting(self, integrator: Any, du: Array, time: float) -> Array:
         """Average a displacement increment over the time in which damping reduces it, shape (N,).

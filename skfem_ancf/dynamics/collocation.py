@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from math import factorial
 from typing import Any
@@ -122,6 +123,15 @@ class Collocation(Scheme):
     def near(self, system: System) -> float:
         """As in :class:`Scheme`; only prescribed motions have rates by differences."""
         return NEAR if system.constraints.moves or system.backend.tables.motion_varies else 0.0
+
+    def acting(self, y: Motion) -> list[tuple[float, Motion]]:
+        if y.memory is None:
+            return super().acting(y)
+        h, (c, b, inverse, *_), (u, v) = y.before, self.table.method, y.memory["start"]
+        U = y.memory["points"][:, :len(u)]
+        V = v + inverse @ (U - u - h * c[:, None] * v) / h
+        return [(h * weight, replace(y, t=y.t + (at - 1.0) * h, u=one, v=rate, memory=None))
+                for weight, at, one, rate in zip(b, c, U, V)]
 
     def lasting(self, integrator: Any, du: Array, time: float) -> Array:
         return integrator.damped(du, time) if integrator.system.damped else du

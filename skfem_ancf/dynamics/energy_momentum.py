@@ -87,12 +87,13 @@ class EnergyMomentum4(EnergyMomentum):
                "'radau' for high order", self)
 
     def step(self, integrator: Any, y: Motion, dt: float) -> Motion:
-        begin, lost = y.t, y.dissipated
+        begin, lost, parts = y.t, y.dissipated, []
         for part in PARTS:
             y = integrator.take(y, part * dt)
+            parts.append(y)
         new = integrator.start(y.u, y.v, begin + dt, dt, ahead=False,
                                history=y.history)
-        new.dissipated = lost
+        new.dissipated, new.start, new.parts = lost, y.start, parts
         return new
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:

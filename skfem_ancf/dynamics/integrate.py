@@ -29,7 +29,7 @@ LOOKED = 16
 #: Memory limit of the dense constraint Jacobians, in gigabytes.
 LARGEST = 2.0
 #: Kind of the files.
-FORMAT = "skfem-ancf checkpoint 12"
+FORMAT = "skfem-ancf checkpoint 13"
 #: Default seconds between two checkpoints, and the fraction of time that writing may take.
 SECONDS, SHARE = 60.0, 0.05
 
@@ -190,7 +190,7 @@ class Checkpoint:
 
     def _write(self):
         """Write all that a Run consists of: the last instant, and the history so far."""
-        run, now, begun = self.run, dict(vars(self.run.y)), time.monotonic()
+        run, now, begun = self.run, {**vars(self.run.y), "parts": None}, time.monotonic()
         groups = {"task": vars(run.task), "run": run.arrays(), "memory": now.pop("memory") or {},
                   "now": now, "history": run.columns(), "sensor": run.recorder.arrays()}
         q0, scheme = _identity(run.system, run.scheme)

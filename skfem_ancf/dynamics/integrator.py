@@ -5,12 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..actions.contact.tables import HAS_ENTRIES
+from ..actions.obstacles.contact import may_touch
 from ..actions.tables import constraint, joint_directions
 from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core.callbacks import handle_of
@@ -128,6 +130,8 @@ class Integrator:
         self._state = StepState._make(
             np.zeros(1, int if hint is I1 else float) for hint in hints(StepState))
         self.dt, self.substeps, self._lost, self.stopped = np.nan, 0, "", False
+        # means over steps differ from values at their ends where a step does not resolve an impact
+        self._means = scheme.conserving and may_touch(system)
         self.longest = max(1, min(STORED // (4 * system.N + system.histories.values.size), BLOCK))
 
 
@@ -202,6 +206,7 @@ class Integrator:
         acceleration, y.multipliers = solve(force - M.multiply(y.acceleration), rate)
         y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
+        y.start = np.append(y.u, 0.0) if self._means else None
         inertia, kinetic = M.multiply(y.acceleration), 0.5 * float(y.v @ M.multiply(y.v))
         change = dt * float(y.v @ inertia) + 0.5 * dt**2 * float(y.acceleration @ inertia)
         # at rest the energy is still zero
@@ -261,7 +266,10 @@ class Integrator:
         turns = np.empty(0) if y.turns is None else y.turns
         columns = (begun + dt * np.arange(first + 1, first + done + 1), *rows.swapaxes(0, 1),
                    *multipliers.swapaxes(0, 1), np.full(done, dt), memories[:, 0], history,
-                   np.broadcast_to(turns, (done, len(turns))))
+                   np.broadcast_to(turns, (done, len(turns))), np.empty((done, 0)))
+        if self._means and done:
+            starts = np.concatenate([[y.u], rows[:done - 1, 0]])
+            columns = *columns[:-1], np.column_stack([starts, columns[COLUMNS.index("before")]])
 
         def memory(k):  # the start of a step, for the next guess
             start = np.array([y.u, y.v]) if k % done == 0 else rows[k % done - 1, :2]
@@ -369,7 +377,10 @@ class Integrator:
                 raise TimeStepFailed(f"{failure}, nor with steps of {dt:.3g}") from None
             logger.info("step of %.3g at t = %.6g halved: %s", dt, y.t, failure)
         self.substeps += 1 if depth else 2
-        return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
+        middle = self.step(y, 0.5 * dt, depth + 1)
+        end = self.step(middle, 0.5 * dt, depth + 1)
+        end.parts = [part for one in (middle, end) for part in one.parts or [replace(one)]]
+        return end
 
     def leap(self, y: Motion, dt: float) -> Motion | None:
         """A longer step past a singular position of the joints, or None."""

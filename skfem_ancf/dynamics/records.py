@@ -318,7 +318,7 @@ def settle(e, t, along, u0, u1, v1, taken):
     """Update the history at the end of a step; ``taken`` is the dissipated work."""
     # ``t`` are the instants of the forces of contact and of the end. Contact works from u0 to u1 in
     # the time ``along`` of a conserving step, or at u1 if that is 0.
-    settle_contact(e.forces, t[0], along, u0 if along > 0.0 else u1, u1, taken)
+    settle_contact(e.forces, t[0], along, u0 if along != 0.0 else u1, u1, taken)
     settle_elements(e.forces, t[1], u0, u1, v1, taken)
     accept_body(e.body, u0, u1, taken)
     e.span[0] = 0.0

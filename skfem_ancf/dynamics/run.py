@@ -215,7 +215,7 @@ class Run:
         self._size = FIRST * task.span if task.dt is None else task.dt
         self._stored: list[dict[str, Array]] = []  # columns, each of some instants
         self._turns = Turns(system)
-        self.recorder = Recorder(sensors, system, lambda y: state_of(system, scheme, y))
+        self.recorder = Recorder(sensors, system, scheme, lambda y: state_of(system, scheme, y))
         self.longest: int | None = None
         self._until, self._value = until, None
         self.event: float | None = None
@@ -295,7 +295,7 @@ class Run:
             self._size = FIRST * self.task.span
             self._sizes.averages = np.zeros_like(self._sizes.averages)
         turned = self._begin_segment(y.u, y.v, y.history, False)
-        turned.dissipated = y.dissipated
+        turned.dissipated, turned.start, turned.parts = y.dissipated, y.start, y.parts or [y]
         return self._follow(y.turns, turned)
 
     def _time(self, n):
@@ -449,8 +449,8 @@ class Run:
         """The stored arrays (nt, ...) by the names of the attributes of Motion."""
         if self._stored:
             return {name: np.concatenate([x[name] for x in self._stored]) for name in COLUMNS}
-        return {name: np.zeros((0, *np.shape([] if name == "history" else getattr(self.y, name))))
-                for name in COLUMNS}
+        return {name: np.zeros((0, *np.shape([] if x is None or name == "history" else x)))
+                for name, x in ((name, getattr(self.y, name)) for name in COLUMNS)}
 
     def history(self) -> History:
         at_end = bool(self._stored) and self._stored[-1]["t"][-1] == self.y.t

@@ -18,7 +18,7 @@ from ..core import (Array, CallbackError, CheckpointError, Immutable, NameUnknow
 from ..equations.system import System
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
-from .base import Motion
+from .base import Motion, Scheme
 
 #: Quantities that are evaluated for many steps at once.
 MOVING = ("position", "displacement", "velocity", "acceleration")
@@ -37,8 +37,9 @@ class Sensor(Immutable):
         "position", "displacement", "velocity" or "acceleration" of points; "strain", "stress" or
         another name of :data:`skfem_ancf.recovery.fields.FIELDS` at points; "N", "Q", "M", "force",
         "curvature", "shear" or "angle" of sections; "joint_force"; "contact", the sum of contact
-        forces, or "contact_pressure", the largest; or a function of the State that returns a number
-        or an array.
+        forces, or "contact_pressure", the largest, both as means of each step, so that force times
+        step is the impulse (with generalised-alpha values at its end); or a function of the State
+        that returns a number or an array.
     at
         Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; the joint
         for "joint_force"; the obstacle or contact, its item or number, None for all; None for a
@@ -164,9 +165,9 @@ class Readings(dict[str, "Array"]):
 class Recorder:
     """Evaluates the sensors during a run."""
 
-    def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
+    def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System, scheme: Scheme,
                  state_of: Callable[[Motion], State]) -> None:
-        self.sensors, self._state_of = list(sensors), state_of
+        self.sensors, self._scheme, self._state_of = list(sensors), scheme, state_of
         self._located: list[Any] = [locate(sensor, system) for _, sensor in self.sensors]
         self._t: list[Array] = []
         self._read: list[list[Array]] = [[] for _ in self.sensors]
@@ -177,8 +178,8 @@ class Recorder:
             return
         others = [(sensor, at) for (_, sensor), at in zip(self.sensors, self._located)
                   if not sensor.moving]
-        rows = [[read(sensor, at, state) for sensor, at in others]
-                for state in map(self._state_of, steps)] if others else []
+        rows = [[self._read_step(sensor, at, y, state) for sensor, at in others]
+                for y, state in zip(steps, map(self._state_of, steps))] if others else []
         columns = iter(zip(*rows))  # a State reads all sensors, then it is freed
         found = [read_steps(sensor, at, steps) if sensor.moving else next(columns)
                  for (_, sensor), at in zip(self.sensors, self._located)]
@@ -189,6 +190,15 @@ class Recorder:
                 refuse(shape != shapes[0], "the sensor {!r} must return the same shape at all "
                        "times, got {}, then {}", name, shapes[0], shape, error=CallbackError)
             before.append(np.array(values))
+
+    def _read_step(self, sensor, at, y, state):
+        """The value of a sensor at the end of a step, of contact the mean over the step."""
+        instants = [one for part in y.parts or [y] for one in self._scheme.acting(part)
+                    ] if sensor.what in CONTACT else ()
+        if len(instants) < 2:
+            return read(sensor, at, state)
+        return sum(time * read(sensor, at, self._state_of(one)) for time, one in instants) / sum(
+            time for time, _ in instants)
 
     def readings(self) -> Readings:
         return Readings(np.concatenate([np.zeros(0), *self._t]), {

@@ -425,7 +425,8 @@ class _Record:
         self._turns = Turns(system)
         self._instants: list[Instant] = []
         self._motions: list[Motion] = []
-        self._recorder = Recorder(sensors, system, lambda y: state_of(system, self.scheme, y))
+        self._recorder = Recorder(sensors, system, self.scheme, lambda y: state_of(
+            system, self.scheme, y))
         self.t = 0.0
 
     def add(self, instant: Instant) -> None:

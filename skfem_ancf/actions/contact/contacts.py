@@ -19,9 +19,10 @@ from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set
 from .laws import mean_pressure, potential, pressure_slope
 from .points import add_resistance
 from .poses import carried, taken_back
-from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, FORCE, HEAD, NOW, POSE, POSES, PRESSURES,
-                     RATE, SETTLE, TANGENT, TINY, TURNS, ContactTables, Law, Pair, Request,
-                     SEEN as SEEN_AT, clear_table, set_clear, transition, weights_of_motion)
+from .tables import (ANCHORED, ANCHORS, AUGMENT, BEGIN, CUSTOM, END, FORCE, HEAD, NOW, POSE,
+                     POSES, PRESSURES, RATE, SETTLE, TANGENT, TINY, TURNS, ContactTables, Law, Pair,
+                     Request, SEEN as SEEN_AT, clear_table, set_clear, transition,
+                     weights_of_motion)
 
 
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
@@ -175,7 +176,7 @@ class Contacts:
         for k in range(len(self.obstacles)):
             rows = poses[k * POSES:(k + 1) * POSES].reshape(-1, POSE)
             rows[:] = self.pose(k, t)
-            if span > 0.0:
+            if span != 0.0:
                 rows[1:] = self.pose(k, t - 0.5 * span), self.pose(k, t + 0.5 * span)
 
     def ask(self, obstacle: int, t: float, x: Array, out: Array) -> None:
@@ -372,24 +373,30 @@ class Contacts:
             out.append((group, np.array([found.surface.real, found.surface.imag]), found.gap))
         return out
 
-    def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
-        """Contact forces; in statics without velocities."""
+    def pushes(self, u: Array, v: Array | None, t: float, start: Array | None = None,
+               span: float = 0.0) -> list[tuple[Any, ...]]:
+        """Contact forces, in statics without velocities; means of a step from ``start`` (N,)."""
         # For each group its obstacle's number, points (2, n), forces (2, n), pressures and gaps
         # (n,).
-        self._place(t)
-        out = []
+        if self.moving or self.custom:
+            self.put(t - 0.5 * span, span, self.tables.poses)
+        same, out = start is None, []
+        middle, rate = (u, v) if start is None else (0.5 * (u + start), (u - start) / span)
         for k, (which, group) in enumerate(self.groups):
             pair, at = self.tables.pairs[k], np.arange(len(group.first))
-            found, R, K = project(pair, NOW, u, at), np.zeros((4, at.size)), np.zeros((16, at.size))
-            touch, spot = touch_of(pair, True, found, found, at)
-            r = response(pair, True, touch)
-            if v is not None and group.law.damping > 0.0:
-                rates = np.empty((4, at.size))
-                set_rates(pair, v, at, rates)
-                damp(pair, 0.0, touch, spot, rates, R, K)
+            found, R, K = project(pair, NOW if same else END, u, at), np.zeros(
+                (4, at.size)), np.zeros((16, at.size))
+            touch, _ = touch_of(pair, same, found if same else project(pair, BEGIN, start, at),
+                                found, at)
+            r = response(pair, same, touch)
+            if rate is not None and group.law.damping > 0.0:
+                there, rates = project(pair, NOW, middle, at), np.empty((4, at.size))
+                set_rates(pair, rate, at, rates)
+                pressed, spot = touch_of(pair, True, there, there, at)
+                damp(pair, 0.0, pressed, spot, rates, R, K)
             add_resistance(touch, r, R)
-            out.append((which, spot.place + self.origin[:, None], -R[:2],
-                        r.pressure / group.areas, found.gap))
+            out.append((which, np.array([found.surface.real, found.surface.imag])
+                        + self.origin[:, None], -R[:2], r.pressure / group.areas, found.gap))
         return out
 
     def slipping(self, u: Array, t: float) -> list[Any]:

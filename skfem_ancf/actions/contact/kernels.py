@@ -55,7 +55,7 @@ SPOT: TypeAlias = Annotated[Spot, MADE]
 @apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
 def of_contacts(tables, request, u, v, out):
     """Add the answer of all pairs to a :class:`~skfem_ancf.actions.contact.tables.Request`."""
-    n, least, end = tables.number, np.empty(tables.number), v if request.span > 0.0 else u
+    n, least, end = tables.number, np.empty(tables.number), v if request.span != 0.0 else u
     if request.what != ALONG and untouched(tables, request.what, u) and (
             request.span == 0.0 or untouched(tables, request.what, end)):
         return

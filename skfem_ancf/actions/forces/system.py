@@ -386,11 +386,12 @@ class Forces:
         way = np.max(np.abs(np.diff(u, axis=0)) * self.clear[SEEN + self._N:], axis=1)
         return way >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 
-    def looks(self, u: Array, t: float) -> Iterator[tuple[Any, Any]]:
+    def looks(self, u: Array, t: float, start: Array | None) -> Iterator[tuple[Any, Any]]:
         """Elements of bodies that touch each other, with what their ``look`` returns."""
         for element, at in self.changing:
             if hasattr(element, "look"):
-                yield element, element.look(u[at].reshape(-1, 2), t, element.history)
+                before = None if start is None else start[at].reshape(-1, 2)
+                yield element, element.look(u[at].reshape(-1, 2), t, element.history, before)
 
     def _of_pattern(self, what, t, factor, u, w, out):
         """Evaluate changing elements at displacements, for :meth:`add_custom`."""

@@ -16,6 +16,9 @@ from ..item import Item
 class Contact:
     """Contact of bodies with obstacles, or with each other.
 
+    In a motion with ``"energy-momentum"`` forces and pressures are means over the step that ends at
+    the instant, also at points that have parted within it: the force times the step is the impulse.
+
     Attributes
     ----------
     points
@@ -65,9 +68,9 @@ class Contact:
                 f"{self.nearest:.3g}>")
 
 
-def may_touch(state: Any) -> bool:
-    """True for a scene with obstacles, or with contact of its members."""
-    forces = getattr(getattr(state, "system", None), "forces", None)
+def may_touch(one: Any) -> bool:
+    """True for a System, or a State of one, with obstacles or with contact of its members."""
+    forces = getattr(getattr(one, "system", one), "forces", None)
     return forces is not None and bool(forces.contacts.obstacles or any(
         hasattr(element, "look") for element, _ in forces.changing))
 
@@ -107,12 +110,24 @@ def _number(members, which):
     return require_index("on", which, len(members))
 
 
+def _step_of(state):
+    """Displacement at the start of the last step and its size; None and 0 for an instant."""
+    start = None if state._motion is None else state._motion.start
+    return (None, 0.0) if start is None or start[-1] == 0.0 else (start[:-1], float(start[-1]))
+
+
+def _pushes(state):
+    contacts = state._equations.forces.contacts
+    v = None if state.t is None else np.array(state.v)
+    found = contacts.obstacles and contacts.pushes(np.array(state.u), v, state._time,
+                                                   *_step_of(state))
+    return contacts, zip(contacts.groups, found)
+
+
 def _of_obstacles(state, known, member):
     """Contact points, forces, pressures, gaps, sticking and the least gap of each group."""
-    contacts, t = state._equations.forces.contacts, state._time
-    v = None if state.t is None else np.array(state.v)
-    pushes = contacts.pushes(np.array(state.u), v, t) if contacts.obstacles else []
-    for (_, group), (k, x, force, pressure, gap) in zip(contacts.groups, pushes):
+    contacts, pushes = _pushes(state)
+    for (_, group), (k, x, force, pressure, gap) in pushes:
         one, first = contacts.obstacles[k], int(group.first[0])
         if not any(one is other for other in known) or (
                 member is not None and not state.system.slices[member].start <= first < (
@@ -130,7 +145,7 @@ def _of_obstacles(state, known, member):
 def _of_bodies(state, known, member):
     """The same of bodies that touch each other, on both sides."""
     t = state._time
-    for element, found in state._equations.forces.looks(np.array(state.u), t):
+    for element, found in state._equations.forces.looks(np.array(state.u), t, _step_of(state)[0]):
         if not any(element.same(other) for other in known):
             continue
         x, y, force, pressure, gap, sticks, own, other = found
@@ -142,10 +157,8 @@ def _of_bodies(state, known, member):
 
 def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, float, Array]]:
     """Forces of contact on a beam, whose DOFs are given: element, xi, and nodal force (nb, 2)."""
-    contacts, u = state._equations.forces.contacts, np.array(state.u)
-    t, out = state._time, []
-    v = None if state.t is None else np.array(state.v)
-    for (_, group), (_, _, force, _, _) in zip(contacts.groups, contacts.pushes(u, v, t)):
+    u, out, (start, _) = np.array(state.u), [], _step_of(state)
+    for (_, group), (_, _, force, _, _) in _pushes(state)[1]:
         if not dofs.start <= group.first[0] < dofs.stop:
             continue
         m, ne, xi = group.points, group.elements - 2, _along_elements(group)
@@ -161,7 +174,8 @@ def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, floa
             out.append((e, float(at), nodal))
     for element, at in state._equations.forces.changing:
         if hasattr(element, "loads_on"):
-            out += element.loads_on(beam, dofs.start, u[at].reshape(-1, 2), element.history)
+            out += element.loads_on(beam, dofs.start, u[at].reshape(-1, 2), element.history,
+                                    None if start is None else start[at].reshape(-1, 2))
     return out
 
 

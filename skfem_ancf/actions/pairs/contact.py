@@ -12,8 +12,8 @@ from ...core import (Array, InputError, refuse, require_flag, require_label, req
                      require_positive, shown)
 from ..contact.contacts import SEEN
 from ..contact.laws import potential
-from ..contact.pairs import (COMPONENTS, faced, meet, pair_accept, pair_force, pair_stiffness,
-                             place, stiffness_of, touch_of)
+from ..contact.pairs import (COMPONENTS, both_faced, faced, meet, pair_accept, pair_force,
+                             pair_stiffness, place, stiffness_of, touch_of)
 from ..contact.points import add_resistance, respond
 from ..forces.base import ForceElement
 from ..places import Vector
@@ -283,38 +283,47 @@ class BodyContact(ForceElement):
 
     # results
 
-    def look(self, x: Array, t: float, history: Array) -> tuple[Array, ...]:
+    def look(self, x: Array, t: float, history: Array, before: Array | None = None
+             ) -> tuple[Array, ...]:
         """Contact points, and the points that they touch, (2, n) each, and forces on the first.
-        Then pressures, gaps, and True for sticking points, (n,), and the members of both, (n,)."""
-        f, (met, touch, r, R) = self._surfaces.facets, self._responding(x, history)
+        Then pressures, gaps, and True for sticking points, (n,), and the members of both, (n,).
+
+        Parameters
+        ----------
+        before
+            Positions (n, 2) at the start of a step, of which forces and pressures are means.
+        """
+        f, (found, met, touch, r, R) = self._surfaces.facets, self._responding(x, history, before)
         p, e, normal = met.at, met.e, touch.gap[:2]
-        at, gap = self._faced(_complex(x, x)[0])[0].x[p], self.broad_search.tables.begins[p] - (
-            met.after)
-        at = _plane(at + self.origin)
+        at, gap = _plane(found.x[p] + self.origin), self.broad_search.tables.begins[p] - met.after
         return (at, at - gap * normal, -R[:2], r.pressure / (0.5 * f.areas[p]), gap,
                 np.abs(r.friction) < (1.0 - SEEN) * self.friction * r.pressure,
                 f.members[f.of[p]], f.members[e])
 
-    def _responding(self, x, history):
-        """Points in contact at x: the Meeting, the Touch, the Response, and resisting forces."""
-        t, found = self._tables(history), self._faced(_complex(x, x)[0])[0]
-        met = meet(t, True, found, found)
-        touch = touch_of(t, found, found, met)
+    def _responding(self, x, history, before):
+        """Points in contact at x, or in a step: what all face, the Meeting, the Touch, the
+        Response, and resisting forces."""
+        t, (z0, z1) = self._tables(history), _complex(x if before is None else before, x)
+        f0, f1 = both_faced(t, z0, z1, z0 is z1)
+        met = meet(t, z0 is z1, f0, f1)
+        touch = touch_of(t, f0, f1, met)
         r, R = respond(touch, t.width, t.friction, 0.0, 1.0), np.zeros(touch.gap.shape)
         add_resistance(touch, r, R)
-        return met, touch, r, R
+        return f1, met, touch, r, R
 
-    def loads_on(self, beam: Beam, first: int, x: Array, history: Array
-                 ) -> list[tuple[int, float, Array]]:
+    def loads_on(self, beam: Beam, first: int, x: Array, history: Array,
+                 before: Array | None = None) -> list[tuple[int, float, Array]]:
         """Of each contact point, and of what it touches: element, xi, nodal force (nb, 2).
 
         Parameters
         ----------
         beam, first
             The Beam of the elements, and its first DOF.
+        before
+            As for :meth:`look`.
         """
-        t, f, (met, _, _, R) = self.broad_search.tables, self._surfaces.facets, self._responding(
-            x, history)
+        t, f, (_, met, _, _, R) = self.broad_search.tables, self._surfaces.facets, self._responding(
+            x, history, before)
         out, p, nb, R = list[Any](), met.at, beam.nd, R[::2] + 1j * R[1::2]
         nodes, C = beam.mesh.t[0] * (nb // 2) + first // 2, self._surfaces.weights(met.e, met.zeta)
         own, other = (-(np.conj(N) * a + np.conj(D) * b).T for (N, D), a, b in (
