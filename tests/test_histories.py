@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -73,6 +74,27 @@ def test_the_consistent_tangent_and_the_yield_surface(plane, kinematic, hardenin
                     rtol=1e-10)
     # a state is the start of the next increment
     assert_allclose(law.stress(strain, after, 0.0)[0], S, atol=1e-9 * YIELD)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("hardening", HARDENING, ids=["perfect", "linear", "Voce", "table"])
+def test_a_strain_far_beyond_yield_costs_what_a_small_one_does(plane, hardening):
+    """Corrections of iterates strain slender beams far; their returns end at round-off."""
+    law, rng = ElasticPlastic(E, NU, YIELD, hardening, plane=plane), np.random.default_rng(2)
+    strain, calls = rng.standard_normal((3, 200)), []
+
+    def count(size):
+        calls.clear()
+        sys.setprofile(lambda frame, event, arg: event == "call" and calls.append(frame))
+        try:
+            S, _, after = law.evaluate(size * KAPPA * H * strain, np.zeros((7, 200)), 0.0)
+        finally:
+            sys.setprofile(None)
+        ratio = law.outputs(size * KAPPA * H * strain, after, S)["yield_ratio"]
+        assert_allclose(ratio[ratio > 0.99], 1.0, rtol=1e-12 * max(10.0, size))
+        return len(calls)
+
+    assert count(1e4) <= 2 * count(3.0)
 
 
 @pytest.mark.parametrize("plane", ["stress", "strain"])

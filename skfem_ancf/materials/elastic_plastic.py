@@ -10,8 +10,9 @@ from ..core import (Array, ArrayLike, refuse, require_finite, require_finite_sca
                     require_not_negative, require_positive)
 from .history import ACROSS, HistoryMaterial
 
-#: Newton corrections of a return to the yield surface, and the relative gap at the end.
-CORRECTIONS, FEW, CLOSED = 100, 10, 1e-13
+#: Newton corrections of a return to the yield surface; the gap at the end over the yield stress, or
+#: over the trial stress, whose round-off it has.
+CORRECTIONS, FEW, CLOSED, ROUGH = 100, 10, 1e-13, 1e-14
 #: Relative excess of the yield stress that is round-off.
 EXCESS = 1e-12
 #: (xx, yy, 2 xy) in the basis in which the plane stress moduli are diagonal (a symmetric matrix),
@@ -161,13 +162,15 @@ class ElasticPlastic(HistoryMaterial):
         end = self._yield(p)[0]
         return steps[k] + (p - h[k, 0]) * (0.5 * (h[k, 1] + end) - self.yield_stress)
 
-    def _returned(self, gap, start, most):
+    def _returned(self, gap, start, most, size):
         """Zeros (n,) of decreasing functions ``gap(g) -> value, slope`` with gap(0) > 0."""
         # Newton's method, after :data:`FEW` corrections within bounds; ``most`` (n,) is one.
-        low, high, g, closed = 0.0 * most, most, start, CLOSED * self.yield_stress
+        # The trial stress ``size`` (n,) of iterates may be far beyond the yield stress.
+        low, high, g = 0.0 * most, most, start
+        closed = np.maximum(CLOSED * self.yield_stress, ROUGH * size)
         for k in range(CORRECTIONS):
             value, slope = gap(g)
-            if np.abs(value).max() <= closed:
+            if (np.abs(value) <= closed).all():
                 break
             if k < FEW:
                 g = np.maximum(g - value / slope, 0.0)
@@ -231,7 +234,7 @@ class ElasticPlastic(HistoryMaterial):
 
         size = np.sqrt(ONES @ squares) / ROOT
         most, start = size / self.yield_stress / A.min(), (size / self._yield(p)[0] - 1.0) / A.max()
-        g = self._returned(gap, start, most)
+        g = self._returned(gap, start, most, size)
         z = x / (1.0 + A * g)
         f = np.sqrt(ONES @ (P * z * z))
         K = self._yield(p + ROOT * g * f)[1]
@@ -267,7 +270,7 @@ class ElasticPlastic(HistoryMaterial):
                 y, K = self._yield(p + ROOT * g)
                 return f - (2.0 * G + H) * g - ROOT * y, -(2.0 * G + H) - 2.0 / 3.0 * K
 
-            g[at] = self._returned(gap, np.zeros_like(p), f / (2.0 * G + H))
+            g[at] = self._returned(gap, np.zeros_like(p), f / (2.0 * G + H), f)
         flow = g * n
         after[:3] += flow[:3] * [[1.0], [1.0], [2.0]]
         after[3:6] += H * flow[:3]
@@ -297,7 +300,7 @@ class ElasticPlastic(HistoryMaterial):
                 y, K = self._yield(before + g)
                 return size - (E + H) * g - y, -(E + H) - K
 
-            g[plastic] = self._returned(gap, 0.0 * size, size / (E + H))
+            g[plastic] = self._returned(gap, 0.0 * size, size / (E + H), size)
         flow = g * np.sign(x)
         after[0] += flow
         after[1] -= 0.5 * flow
