@@ -23,7 +23,7 @@ from ..core import (Array, InputError, TimeFunction, ask_array, refuse, require_
                     require_function, shown, stress_of)
 from ..formulations import COMPONENTS
 from ..sections import Layer
-from .item import Item, takes_time
+from .item import Item, takes
 from .loads import Amplitude, Load
 from .symbols import Symbol, middle
 
@@ -31,21 +31,6 @@ from .symbols import Symbol, middle
 
 #: Half the number of points across a layer, and round-off relative to the largest strain.
 SECTION, ROUND_OFF = 6, 1e-12
-
-
-def energy_difference(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> float:
-    """The integral of W(E) - W(E - factor E0)."""
-    total = 0.0
-    for e, E0 in zip(beam.kernel.elements, eigen):
-        E = strains(e, u)
-        if e.t.law.kind == HISTORY:  # in its stored energy
-            continue
-        if e.t.law.kind == LINEAR:
-            total += factor * float(np.sum(stresses_of(e, E0).T * (E - 0.5 * factor * E0)))
-        else:
-            total += float(np.sum(energy_at(e, e.at_points(E))
-                                  - energy_at(e, e.at_points(E - factor * E0))))
-    return total
 
 
 def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
@@ -167,7 +152,7 @@ class EigenStrain(Load):
         """Split functions of (x, y, t) into products of functions of place and of time."""
         k, beam = layout.number(self.beam), layout.beam(self.beam)
         given = {name: getattr(self, name) for name in self.given}
-        timed = {name: f for name, f in given.items() if takes_time(f)}
+        timed = {name: f for name, f in given.items() if takes(f, 3)}
         out: list[Item] = []
         for name, f in timed.items():
             for g, c in products(self.given[name], f, beam):
@@ -239,10 +224,17 @@ class EigenStrain(Load):
         return *entries_of(element_dofs(beam)), -K.ravel()
 
     def potential(self, u: Array) -> float:
-        if self._strains is not None:
-            start, now = (energy_difference(self.beam, x, self._strains, self._size)
-                          for x in (0.0 * u, u))
-            return start - now
+        if self._strains is not None:  # minus the integral of W(E) - W(E - factor E0)
+            total, factor = 0.0, self._size
+            for e, E0 in zip(self.beam.kernel.elements, self._strains):
+                start, E = strains(e, 0.0 * u), strains(e, u)
+                if e.t.law.kind == LINEAR:
+                    total -= factor * float(np.sum(stresses_of(e, E0).T * (E - start)))
+                elif e.t.law.kind != HISTORY:  # that is in its stored energy
+                    W = [energy_at(e, e.at_points(x)) for x in (
+                        E, E - factor * E0, start, start - factor * E0)]
+                    total -= float(np.sum(W[0] - W[1]) - np.sum(W[2] - W[3]))
+            return total
         strain = self.beam.kernel.strain(u)
         return -sum(float(np.sum(T.T * strain.reshape(-1, strain.shape[2])))
                     for t, T in zip(self.beam.kernel.tables, self.eigen_stresses)

@@ -151,13 +151,11 @@ class Item(Immutable, Bound):
         return other
 
 
-def takes_time(function: Any) -> bool:
-    """True for a function of three arguments, x, y and t."""
-    if not callable(function):
-        return False
+def takes(function: Any, n: int) -> bool:
+    """True for a function of n required arguments, as x, y and t."""
     try:
         kinds = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError):  # no function, or a built-in one
         return False
     return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
-               for p in kinds) == 3
+               for p in kinds) == n

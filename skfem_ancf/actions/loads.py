@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
 from typing import Any, cast
@@ -22,7 +21,7 @@ from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .bound import MemberForce, at_generic_displacements, require_entries, user_parts
-from .item import Item
+from .item import Item, takes
 from .places import Vector, dense_entries, members_at, nearest_of, section
 from .symbols import (ARROWS, Symbol, arrows_along, at_node, faces_of, force_symbol, inside,
                       values_at)
@@ -662,7 +661,7 @@ class LineLoad(Load):
 
     def bind(self, beam: Beam) -> Load:
         given = self.per_length
-        if of_place_and_time(given):
+        if takes(given, 2):
             return LineLoadInTime(beam, self.chains, given, self.amplitude)
         vector, distribution = _along_axis(beam, self.chains, given, "force(x)")
         return DeadLoad(beam, vector, self.amplitude, distribution)
@@ -672,7 +671,7 @@ class LineLoad(Load):
         given: Any = self.per_length
         chains = np.unique(beam.mesh.chains) if self.chains is None else self.chains
         times = (0.0, 1.0) if self._time is None else (self._time,)
-        functions = [given] if not of_place_and_time(given) else [
+        functions = [given] if not takes(given, 2) else [
             lambda x, t=t: given(x, t) for t in times]
         for k, chain in enumerate(chains):
             at = [inside(layout, beam, *place) for place in arrows_along(
@@ -716,15 +715,3 @@ class LineLoadInTime(TimedLoad):
 
     def at(self, t: float) -> tuple[Array, Distribution]:
         return _along_axis(self.beam, self.chains, lambda x: self.per_length(x, t), "force(x, t)")
-
-
-def of_place_and_time(force: Any) -> bool:
-    """True for a function of two required arguments, x and the time."""
-    if not callable(force):
-        return False
-    try:
-        parameters = inspect.signature(force).parameters.values()
-    except (TypeError, ValueError):  # of a built-in function
-        return False
-    return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
-               for p in parameters) == 2

@@ -15,9 +15,9 @@ from ...core import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_each, add_products
 from ..contact.kernels import FAR, of_contacts, untouched
 from ..contact.pairs import pair_accept, pair_force, pair_tables
-from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, MARGIN, RATE,
-                              SAFE, SETTLE, TANGENT, TURNS, ContactTables, Request,
-                              RESISTING as RUBBING, is_clear, set_clear)
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SETTLE,
+                              TANGENT, TURNS, ContactTables, Request, RESISTING as RUBBING,
+                              is_clear, set_clear)
 
 #: Kinds of elements.
 SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))
@@ -101,11 +101,9 @@ def _of(kinds, kind, y, w, rows, out):
             _part(kinds, kind, VECTORS, w), _part(kinds, kind, rows, out))
 
 
-#: Values of ``what``; from PUSHING on of elements whose stiffness changes its pattern: their force
-#: without and due to velocities, its derivative along a correction, the entries of the tangent of a
-#: step, and their history at its end.
-ELASTIC, RESISTING, DERIVATIVES, TURNED, SETTLED = range(5)
-PUSHING, PUSHED_BACK, ALONG_PUSHING, ENTRIES, ACCEPTING = range(5, 10)
+#: Values of ``what``; from PUSHING on of elements whose stiffness changes its pattern alone: their
+#: force, its derivative along a correction, and the entries of the tangent of a step.
+ELASTIC, RESISTING, DERIVATIVES, TURNED, SETTLED, PUSHING, ALONG_PUSHING, ENTRIES = range(8)
 
 
 @source
@@ -154,19 +152,17 @@ def add_elastic_force(tables, t, span, u0, u1, f):
     # It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
-    if tables.changing > 0 and not at_rest(tables, u0, u1):
-        _add_changing(tables, t, span, u0, u1, f)
+    if tables.paired > 0 and not at_rest(tables, u0, u1):
+        _add_pairs(tables, span, u0, u1, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
 
 @source
-def _add_changing(tables, t, span, u0, u1, f):
-    """Add the mean force of elements whose stiffness changes its pattern."""
-    least, found, total = FAR, np.empty(1), f.view(np.complex128)
-    if tables.changing > tables.paired:
-        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, span, u0, u1, f)
-        least = tables.clear[MARGIN] / SAFE
+def _add_pairs(tables, span, u0, u1, f):
+    """Add the mean force of members that touch each other."""
+    found, total = np.empty(1), f.view(np.complex128)
+    least = FAR if tables.changing == tables.paired else 0.0  # of others no gap is known
     for k in range(tables.paired):
         pair = pair_tables(tables, k)
         out = np.zeros(pair.used.size, np.complex128)
@@ -187,8 +183,6 @@ def add_resisting_force(tables, t, u, v, f):
     """Add the velocity-dependent part of the force."""
     if tables.start.size > 0:
         _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
-    if tables.changing > tables.paired and not at_rest(tables, u, u):
-        call_custom(ELEMENTS, tables.custom, np.int64(PUSHED_BACK), t, 0.0, u, v, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
 
@@ -237,8 +231,10 @@ def contact_work(tables, t, u, du, f):
     """Product of the contact force at u and du; f is workspace, zero on return."""
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(FORCE, t), u, u, f)
-    if tables.changing > 0:
-        _add_changing(tables, t, 0.0, u, u, f)
+    if tables.changing > tables.paired:
+        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
+    if tables.paired > 0:
+        _add_pairs(tables, 0.0, u, u, f)
     work = dot(f, du)
     clear(f)
     return work
@@ -291,15 +287,6 @@ def settle_elements(tables, t, u0, u1, v, out):
         pair = pair_tables(tables, k)
         if pair.friction > 0.0 and not at_rest(tables, u0, u1):
             out[0] += pair_accept(pair, _used(pair, u0), _used(pair, u1), pair.history)
-    if tables.changing > tables.paired and not at_rest(tables, u0, u1):
-        n = u0.size
-        w = np.empty(2 * n)
-        for i in indices(n):
-            w[i] = u1[i]
-        rates = w[n:]
-        for i in indices(n):
-            rates[i] = v[i]
-        call_custom(ELEMENTS, tables.custom, np.int64(ACCEPTING), t, 0.0, u0, w, out)
 
 
 @source

@@ -16,9 +16,9 @@ from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
 from .inertia import RotatingFrame
-from .kernels import (ACCEPTING, ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHED_BACK, PUSHING,
-                      RESISTING, TORSION, ForceTables, element_stiffness, potential, run_kinds,
-                      vectors_of)
+from .kernels import (ALONG_PUSHING, DERIVATIVES, ELASTIC, ENTRIES, NUMBERS, PUSHING, RESISTING,
+                      SETTLED, TORSION, TURNED, ForceTables, element_stiffness, potential,
+                      run_kinds, vectors_of)
 from .springs import TorsionalSpring
 
 
@@ -32,8 +32,9 @@ NONE = np.zeros(0, dtype=np.int64)
 
 
 class Forces:
-    """The bound force elements of a scene; ``custom`` are the user-defined ones, as solvers see
-    them; ``remembering`` are those with a memory.
+    """The bound force elements of a scene; ``custom`` are those of no kind that kernels know, as
+    solvers see them, ``changing`` those with a pattern that changes, with their DOFs, and
+    ``remembering`` those with a memory.
 
     ``couples_far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given,
     with places that differ by more than 1; ``distant`` if one always does. ``symmetric``: all
@@ -55,6 +56,7 @@ class Forces:
     #: Of a scene without elements.
     masses: Any = ()
     elements = custom = changing = remembering = parts = _springs = _blocks = _slices = masses
+    _paired: Any = masses
     rows = size = 0
     distant = couples_far = resists = False
     symmetric = True
@@ -85,9 +87,11 @@ class Forces:
         for element in self.custom:
             m = 2 * len(element.links)
             dense = element.entries is None
-            a, b = np.divmod(np.arange(m * m), m) if dense else element.entries
+            a, b = (NONE, NONE) if element.changing else np.divmod(
+                np.arange(m * m), m) if dense else element.entries
             numbers = at + np.arange(len(a))
-            self._blocks.append(numbers.reshape(m, m) if dense else numbers)
+            if not element.changing:
+                self._blocks.append(numbers.reshape(m, m) if dense else numbers)
             self._slices.append((slice(row, row + m), slice(at, at + len(a))))
             blocks.append((element.links, row + np.arange(m), a, b, numbers))
             row, at = row + m, at + len(a)
@@ -111,37 +115,38 @@ class Forces:
         self.contacts = Contacts(self.elements, N, len(self._springs))
         damping = ({0: c, 1: b, 2: b, 3: a or b}[part.kind] for part in self.parts
                    for a, b, c in [part.numbers[:3]])
-        self.resists = (any(e.resists for e in (*self.custom, *(e for e, _ in self.changing)))
+        self.resists = (any(e.resists for e in self.custom)
                         or any(c > 0.0 for c in damping)
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
     def _sort(self):
         """Sort elements into parts that the kernels know, by kind, and the user's, by pattern."""
         parts: list[KernelElement] = []
-        self.custom, self.changing = [], []
+        self.custom, self.changing, self.remembering = [], [], []
         for element in self.elements:
             found = element.parts()
             if found is not None:
                 parts += found
-            elif element.changing:
-                self.changing.append((recalled(element), element.all_dofs))
-            else:
-                self.custom.append(recalled(element))
-        self.remembering = [e for e in (*self.custom, *(e for e, _ in self.changing))
-                            if isinstance(e, Remembering)]
+                continue
+            one = recalled(element)
+            if element.changing:
+                self.changing.append((one, element.all_dofs))
+            if not hasattr(element, "broad_search"):
+                self.custom.append(one)
+            if isinstance(one, Remembering):
+                self.remembering.append(one)
         order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
         self.parts = [parts[k] for k in order]
         self._place = np.argsort(order) if order else np.zeros(0, np.int64)
 
     def _pair(self, fresh=False):
-        """Set the tables of contact of members, and the other elements that change their pattern;
-        ``fresh`` with a search of their own."""
-        paired = [(e, at) for e, at in self.changing if hasattr(e, "broad_search")]
-        self._called = [(e, at) for e, at in self.changing if not hasattr(e, "broad_search")]
-        self._searches = [e.broad_search.fresh() if fresh else e.broad_search for e, _ in paired]
+        """Set the tables of contact of members; ``fresh`` with a search of their own."""
+        self._paired = [(e, at) for e, at in self.changing if hasattr(e, "broad_search")]
+        self._searches = [e.broad_search.fresh() if fresh else e.broad_search
+                          for e, _ in self._paired]
         self.pairs: Any = tuple(
             search.tables._replace(used=at[::2] // 2, history=e.values)
-            for search, (e, at) in zip(self._searches, paired)) or NONE
+            for search, (e, at) in zip(self._searches, self._paired)) or NONE
 
     def _couple(self, blocks, places):
         """Find the vectors, ``start + B u``, and the entries of all derivatives by two of them."""
@@ -209,8 +214,7 @@ class Forces:
     def acting_rows(self, u: Array, t: float) -> tuple[Array, Array]:
         """Derivatives of positions of concentrated elements, and forces of items, (k, N) each."""
         rows, own, N = [], [np.zeros((0, self._N))], self._N
-        known = {id(getattr(e, "element", e)): e for e in (*self.custom,
-                                                           *(e for e, _ in self.changing))}
+        known = {id(getattr(e, "element", e)): e for e in self.custom}
         for element in self.elements:
             if element.of_item is None:
                 if not (element.distributed or element.internal):
@@ -251,7 +255,7 @@ class Forces:
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.custom, self._slices)) + sum(
-            element.potential_at(u[at].reshape(-1, 2), t) or 0.0 for element, at in self.changing)
+            element.potential_at(u[at].reshape(-1, 2), t) or 0.0 for element, at in self._paired)
 
     @property
     def sampled(self) -> list[Any]:
@@ -402,56 +406,40 @@ class Forces:
         if what == ALONG_PUSHING:
             i, j, values = self.changing_entries(t, u, u)
             out[0] += values @ (w[i] * w[j])
-        for element, at in self.changing if what == ALONG_PUSHING else self._called:
+        for element, at in self.changing:
             x, y = (z[at].reshape(-1, 2) for z in (u, w))
-            if what == PUSHING:
-                same, span = np.array_equal(x, y), [factor] * isinstance(element, Remembering)
-                out[at] -= np.ravel(element.force(x, 0.0 * x, t) if same else
-                                    element.mean_force(x, y, t, *span))
-            elif what == PUSHED_BACK and element.resists:
-                out[at] -= np.ravel(element.force(x, y, t) - element.force(x, 0.0 * y, t))
-            elif what == ALONG_PUSHING:
+            if what == ALONG_PUSHING:
                 out[1] = max(out[1], element.search_intervals(x, x + y))
-            elif what == ACCEPTING and isinstance(element, Remembering):
-                out[0] += element.accept(x, y, w[len(u):][at].reshape(-1, 2), t)
-        if what == PUSHING:
-            set_clear(self.clear, w, self._least_gap(w, self._called))
+            elif not hasattr(element, "broad_search"):
+                out[at] -= np.ravel(element.force(x, 0.0 * x, t))
 
-    def _least_gap(self, u, elements=None):
+    def _least_gap(self, u):
         """The least gap of changing elements; 0 for unknown."""
         return min(element.least_gap(u[at].reshape(-1, 2)) if hasattr(element, "least_gap") else 0.0
-                   for element, at in elements or self.changing)
+                   for element, at in self.changing)
 
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
         """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.call_custom`."""
-        # ``what`` is 0: the mean force at zero velocity between positions a and b, over a span of
-        # time ``factor``; 1: the force at a due to velocities b; 2: the derivatives by positions,
-        # plus a factor times those by velocities; 3: keep the angles of torsional springs at a; 4:
-        # set the histories at the end of a step from a to b, with velocities in the second half of
-        # b, and add what it dissipates. From 5 on a and b are displacements (N,), see
-        # :meth:`_of_pattern`.
+        # a and b are positions or, for SETTLED, a step's start and its end with velocities; from
+        # PUSHING on displacements (N,), see :meth:`_of_pattern`
         if what >= PUSHING:
             self._of_pattern(what, t, factor, a, b, out)
             return
         self.recall()
         for element, (rows, places) in zip(self.custom, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
-            if what == 0:
-                remembers = isinstance(element, Remembering)
+            remembers = isinstance(element, Remembering)
+            if what == ELASTIC:
                 out[rows] -= np.ravel(element.mean_force(x, y, t, *[factor] * remembers))
-            elif what == 1:
-                if element.resists and np.any(y):
-                    out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
-                                          - element.force(x, 0.0 * y, t))
-            elif what == 3:
-                if isinstance(element, TorsionalSpring):
-                    self.contacts.turns[self._springs.index(element)] = element.angle_of(x)
-            elif what == 4:
-                if isinstance(element, Remembering):
-                    v = b[len(a):][rows].reshape(-1, 2)
-                    out[0] += element.accept(x, y, v, t)
-            else:
+            elif what == RESISTING and element.resists and np.any(y):
+                out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
+                                      - element.force(x, 0.0 * y, t))
+            elif what == TURNED and isinstance(element, TorsionalSpring):
+                self.contacts.turns[self._springs.index(element)] = element.angle_of(x)
+            elif what == SETTLED and remembers:
+                out[0] += element.accept(x, y, b[len(a):][rows].reshape(-1, 2), t)
+            elif what == DERIVATIVES and not element.changing:
                 found = np.array(element.stiffness(x, y, t))
                 if element.resists and factor != 0.0:
                     found = found + factor * np.asarray(element.resistance(x, y, t))

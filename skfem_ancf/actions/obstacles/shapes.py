@@ -13,7 +13,7 @@ from ...core import (Array, ArrayLike, CallbackError, Immutable, InputError, ask
                      require_not_negative, require_positive, warnings_as_errors)
 from ..contact.gap import outline
 from ..contact.tables import CUSTOM, OUTLINE
-from ..item import takes_time
+from ..item import takes
 from .outlines import circle, clipped, contour
 
 #: Relative step of differences of a distance function, and of its gradient.
@@ -322,7 +322,7 @@ class SignedDistance(Shape):
             refuse(function and not callable(function), "{} must be a function of x and y that "
                    "returns derivatives, got {!r}", name, function)
         self.pivot = require_finite("pivot", pivot, (2,))
-        self._timed = {name: takes_time(g) for name, g in (
+        self._timed = {name: takes(g, 3) for name, g in (
             ("f", f), ("gradient", gradient), ("hessian", hessian))}
         self._by_steps, self._scale = False, 1.0
 
