@@ -6,9 +6,9 @@ import pickle
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamCable, Frame, InputError, MeshBeam, RigidBody, Scene,
-                        StVenantKirchhoff)
-from skfem_ancf.core import MeshError, refuse
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, InputError, MeshBeam,
+                        RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf.core import FileError, MeshError, refuse, refuse_any, retold
 from skfem_ancf.core.errors import SYNONYMS, NearMisses
 
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
@@ -73,6 +73,34 @@ def test_a_refusal_shows_values_on_one_short_line():
     assert len(text) < 120
     with pytest.raises(InputError, match="^give {'a': 1}$"):
         refuse(True, "give {'a': 1}")
+
+
+def test_a_refusal_names_the_first_wrong_entry():
+    x = np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
+    refuse_any(x[0] < 0.0, "{k} {:d}", object())
+    with pytest.raises(MeshError, match=r"^entry 1 of 3 is at \(1.0, 4.0\), \[1.0, 4.0\], not 7$"):
+        refuse_any(x[0] > 0.5, "entry {k} of {} is at {:.1f}, {}, not {}", 3, x, x,
+                   np.array([6, 7, 8]), error=MeshError)
+    refuse([], "the first is {[0]}", [])  # there is none
+    with pytest.raises(InputError, match="^the first is 5$"):
+        refuse([5], "the first is {[0]}", [5])
+
+
+def test_errors_are_told_in_other_words():
+    with pytest.raises(MeshError, match=r"^'a' is no number: could not convert .*'a'$"), (
+            retold(ValueError, "{!r} is no number: {error}", "a", error=MeshError)):
+        float("a")
+    with pytest.raises(KeyError), retold(ValueError, "{error}"):
+        {}["a"]
+    with pytest.raises(FileError, match="^once$"), retold(OSError, "again: {error}"):
+        raise FileError("once")
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2)])
+def test_a_beam_is_probed_at_a_named_end(element):
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.05), element, STEEL, 0.05)
+    for one, other in zip(beam.probe("right"), beam.probe((1.0, 0.0))):
+        assert np.array_equal(one, other)
 
 
 def test_what_is_like_nothing_is_just_said(things):

@@ -20,7 +20,7 @@ from ..beam.kernels.law import CUSTOM, HISTORY, LINEAR, POINTWISE
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.strains import on_grid, strain_at, stretched
 from ..core import (Array, InputError, TimeFunction, ask_array, refuse, require_finite_scalar,
-                    require_function, shown, stress_of)
+                    require_function, retold, stress_of)
 from ..formulations import COMPONENTS
 from ..sections import Layer
 from .item import Item, takes
@@ -324,11 +324,8 @@ def _number_or_function(name, value, optional=True):
         return None
     if callable(value):
         return require_function(name, value, "of (x, y)")
-    try:
+    with retold(InputError, "{} must be a number or a function of (x, y), got {!r}", name, value):
         return require_finite_scalar(name, value)
-    except InputError as error:
-        raise InputError(f"{name} must be a number or a function of (x, y), got {shown(value)}"
-                         ) from error
 
 
 def _evaluated(name, f, x, y):

@@ -14,7 +14,7 @@ from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, S
 from ..beam.kinematics import element_dofs, entries_of
 from ..core import (Array, ArrayLike, InputError, NameUnknown, Place, TimeFunction, along, ask,
                     gauss, product_rule, refuse, require_finite, require_flag, require_function,
-                    require_module, require_slope)
+                    require_module, require_slope, retold)
 from .bound import at_generic_displacements
 from .item import Item
 from .loads import Load
@@ -509,12 +509,9 @@ def check_derivatives(energy: Energy, beam: Beam, u: ArrayLike | None = None) ->
 
 
 def _shaped(name, found, shape):
-    try:
+    with retold(ValueError, "{}(r, F, X, t) of an Energy must return the shape {}, got {}; sums "
+                "over components are (r**2).sum(axis=0)", name, shape, np.shape(found)):
         values = np.broadcast_to(np.asarray(found), shape)
-    except ValueError:
-        raise InputError(f"{name}(r, F, X, t) of an Energy must return the shape {shape}, got "
-                         f"{np.shape(found)}; sums over components are (r**2).sum(axis=0)"
-                         ) from None
     refuse(values.dtype.kind not in "biufc", "{}(r, F, X, t) of an Energy must return numbers, got "
            "{!r}", name, found)
     return values

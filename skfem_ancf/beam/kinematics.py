@@ -45,9 +45,9 @@ def locate(beam: Any, point: Any) -> tuple[int, Array]:
 def probe(beam: Any, point: Any) -> tuple[Array, Array]:
     """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`."""
     e, X = locate(beam, point)
-    refuse(not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed, "the point {} is off "
-           "the axis of a cable, where the position is not linear in its unknowns: use a point of "
-           "the axis, or scene.moment on an end", tuple(map(float, np.ravel(point))))
+    refuse(not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed, "the point {!r} is "
+           "off the axis of a cable, where the position is not linear in the degrees of freedom: "
+           "use a point of the axis, and scene.moment for a moment on an end section", point)
     return probe_reference(beam, e, X)
 
 

@@ -9,7 +9,7 @@ from .errors import (AncfError, CallError, CallbackError, CheckpointError, Check
                      require_index, require_integer, require_kind, require_label, require_like,
                      require_moderate, require_module, require_names, require_not_negative,
                      require_option, require_options, require_path, require_point, require_positive,
-                     require_range, require_slope, require_text, require_unmasked, sample, shown,
+                     require_slope, require_text, require_unmasked, retold, sample, shown,
                      warn, warnings_as_errors)
 from .types import Array, ArrayLike, Law, Place, Rule, StrPath, TimeFunction
 from .immutable import (Immutable, array_cache, cached_property, is_builtin, packed, read_only,

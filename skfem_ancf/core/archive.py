@@ -13,7 +13,7 @@ from secrets import token_hex
 
 import numpy as np
 
-from .errors import FileError
+from .errors import FileError, retold
 from .types import Array, ArrayLike, StrPath
 
 #: Longest stem of a temporary file's name; names are limited to 255 characters.
@@ -70,30 +70,10 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
 
 
 @contextmanager
-def writing(path: StrPath, kinds: tuple[type[BaseException], ...] = (OSError,)) -> Iterator[None]:
-    """Convert some errors of the block to FileError."""
-    try:
-        yield
-    except FileError:
-        raise
-    except kinds as error:
-        raise FileError(f"cannot write {str(path)!r}: {error}") from error
-
-
-@contextmanager
-def reading(path: StrPath, what: str, *kinds: type[BaseException]) -> Iterator[None]:
-    """Convert some errors of the block to FileError; ``what`` the file should be."""
-    try:
-        yield
-    except kinds as error:
-        raise FileError(f"{path} cannot be read as a {what}: {error}") from error
-
-
-@contextmanager
 def output_file(path: StrPath) -> Iterator[Path]:
     """As :func:`replacing`; creates the folder and raises FileError."""
     path = Path(path)
-    with writing(path):
+    with retold(OSError, "cannot write {!r}: {error}", str(path), error=FileError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as new:
             yield new

@@ -263,14 +263,6 @@ def require_positive(name: str, value: object, unit: str = "") -> float:
     return value
 
 
-def require_range(name: str, value: object, low: float, high: float) -> float:
-    """A number from ``low`` to ``high``."""
-    number = require_finite_scalar(name, value)
-    refuse(not low <= number <= high, "{} must lie in [{:g}, {:g}], got {!r}", name, low, high,
-           number)
-    return number
-
-
 def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
     """A finite number >= 0; ``energy`` explains why in the message."""
     number = require_finite_scalar(name, value)
@@ -529,6 +521,18 @@ def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator
         raise
     except Exception as error:
         raise kind(f"{what.format(*of)}: {type(error).__name__}: {error}; {hint}") from error
+
+
+@contextmanager
+def retold(kinds: Any, message: str, *values: Any, error: type[AncfError] = InputError
+           ) -> Iterator[None]:
+    """As :func:`refuse` for errors of some kinds in the block, whose text is ``{error}``."""
+    try:
+        yield
+    except FileError:  # an OSError that says it already
+        raise
+    except kinds as found:
+        raise error(message.format(*map(_Shown, values), error=found)) from None
 
 
 def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from ..core.archive import Unreadable, read, write
 from ..core import (AncfError, Array, CheckpointError, CheckpointWarning, ConvergenceError,
                     Interrupted, ModelWarning, StrPath, refuse, require_flag, require_function,
-                    require_integer, require_path, shown, warn)
+                    require_integer, require_path, retold, shown, warn)
 from ..core.progress import progress_bar
 from ..equations.stability import largest_displacement
 from ..equations.system import System
@@ -147,11 +147,9 @@ def _read(path: StrPath) -> dict[str, Any]:
     """The groups of arrays of a checkpoint, and its single arrays, by name."""
     path = require_path("checkpoint", path, (".npz",))
     refuse(not path.exists(), "there is no file {!r}", str(path), error=CheckpointError)
-    try:
+    with retold((OSError, Unreadable), "{!r} cannot be read, it is not a checkpoint or damaged: "
+                "{error}", str(path), error=CheckpointError):
         arrays = read(path)
-    except (OSError, Unreadable) as error:
-        raise CheckpointError(f"{str(path)!r} cannot be read, it is not a checkpoint or damaged: "
-                              f"{error}") from None
     refuse(str(arrays.get("format")) != FORMAT, "{!r} is not a checkpoint of a motion, or not of "
            "this version, which reads {!r}", str(path), FORMAT, error=CheckpointError)
     found: dict[str, Any] = {"task": {}, "run": {}, "now": {}, "history": {}, "memory": {},
@@ -173,20 +171,16 @@ class Checkpoint:
     def begin(self) -> None:
         """Write the start, so that problems show before the run."""
         if self.path.exists():
-            try:
+            with retold(CheckpointError, "{error}; it is not overwritten: choose another name",
+                        error=CheckpointError):
                 there = _read(self.path)
-            except CheckpointError as error:
-                raise CheckpointError(f"{error}; it is not overwritten: choose another name"
-                                      ) from None
             refuse(not there["done"], "{!r} holds a run up to t = {:.6g} of {:.6g}: "
                    "scene.resume({!r}) continues it; delete the file to start again",
                    str(self.path), there["now"]["t"], there["task"]["t_end"], str(self.path),
                    error=CheckpointError)
-        try:
+        with retold(OSError, "the checkpoint {!r} cannot be written: {error}", str(self.path),
+                    error=CheckpointError):
             self._write()
-        except OSError as error:
-            raise CheckpointError(f"the checkpoint {str(self.path)!r} cannot be written: {error}"
-                                  ) from None
 
     def _write(self):
         """Write all that a Run consists of: the last instant, and the history so far."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core import InputError, require_option, shown
+from ..core import require_option, retold
 
 #: Metres and newtons in a unit.
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
@@ -44,11 +44,9 @@ TYPICAL = {
 
 def values_of(name: str, units: Any) -> tuple[dict[str, float], str]:
     """Arguments of a material in units of force and length, and what is said of them."""
-    try:
+    with retold((KeyError, TypeError, IndexError), "units must be a force of {} and a length of "
+                "{}, as ('N', 'mm'), got {!r}", ", ".join(FORCES), ", ".join(LENGTHS), units):
         force, length = FORCES[units[0]], LENGTHS[units[1]]
-    except (KeyError, TypeError, IndexError):
-        raise InputError(f"units must be a force of {', '.join(FORCES)} and a length of "
-                         f"{', '.join(LENGTHS)}, as ('N', 'mm'), got {shown(units)}") from None
     known = STANDARD | TYPICAL
     E, nu, density, expansion, strength = known[require_option("material", name, known)]
     stress = length**2 / force

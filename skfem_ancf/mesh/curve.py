@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import (Array, CallbackError, FileError, MeshError, ask_array, gauss, refuse,
                     refuse_any, require_finite, require_finite_scalar, require_integer,
-                    require_path, warnings_as_errors)
+                    require_path, retold, warnings_as_errors)
 
 # a smooth axis through points from an array or a text file
 
@@ -28,20 +28,18 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
     if isinstance(points, str) or hasattr(points, "__fspath__"):
         # rows x, y of a file, separated by commas, blanks or semicolons, with an optional header
         path = require_path("points", points)
-        try:
+        with retold((OSError, UnicodeDecodeError), "{} cannot be read: {error}", path,
+                    error=FileError):
             lines = path.read_text(encoding="utf-8-sig").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise FileError(f"{path} cannot be read: {error}") from error
         lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
         if any(";" in line for line in lines):  # maybe with decimal commas
             lines = [line.replace(",", ".").replace(";", ",") for line in lines]
         if lines and any(letter.isalpha() and letter not in "eE" for letter in lines[0]):
             lines = lines[1:]
-        try:
+        with retold(ValueError, "{} must hold rows of two numbers, x and y: {error}", path,
+                    error=MeshError):
             points = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None,
                                 ndmin=2, quotechar='"')
-        except ValueError as error:
-            raise MeshError(f"{path} must hold rows of two numbers, x and y: {error}") from None
         refuse(points.shape[1] != 2, "{} must hold rows of two numbers, x and y; it has {} columns",
                path, points.shape[1], error=MeshError)
     x = require_finite("points", points, (None, 2))

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (MeshError, lagrange, refuse, refuse_any, require_finite, require_kind,
-                    require_module, require_names, require_option, require_path)
-from ..core.archive import reading
+from ..core import (FileError, MeshError, lagrange, refuse, refuse_any, require_finite,
+                    require_kind, require_module, require_names, require_option, require_path,
+                    retold)
 from .frame_graph import FrameGraph
 
 
@@ -34,7 +34,8 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
     import meshio
 
     ezdxf = require_module("ezdxf", "dxf")
-    with reading(path, "drawing", OSError, ezdxf.DXFError):
+    with retold((OSError, ezdxf.DXFError), "{} cannot be read as a drawing: {error}", path,
+                error=FileError):
         drawing = ezdxf.readfile(path)
         entities = list(drawing.modelspace())
     places: list[Any] = []  # two of each line, then one of each point
@@ -132,7 +133,8 @@ def _mesh_of(mesh, unit):
         path = require_path("mesh", mesh)
         if path.suffix.lower() == ".dxf":
             return mesh_of_dxf(path, unit)
-        with reading(path, "mesh", Exception, SystemExit):  # meshio exits on an unknown format
+        with retold((Exception, SystemExit),  # meshio exits on an unknown format
+                    "{} cannot be read as a mesh: {error}", path, error=FileError):
             mesh = meshio.read(path)
         if path.suffix.lower() == ".inp":
             _require_sets_of_abaqus(path)

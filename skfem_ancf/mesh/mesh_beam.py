@@ -14,11 +14,11 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
-from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, StrPath,
-                    archive, cached_property, is_builtin, packed, refuse, refuse_any,
-                    require_finite, require_finite_scalar, require_function, require_integer,
-                    require_moderate, require_option, require_options, require_path,
-                    require_positive, require_unmasked)
+from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, StrPath, archive,
+                    cached_property, is_builtin, packed, refuse, refuse_any, require_finite,
+                    require_finite_scalar, require_function, require_integer, require_moderate,
+                    require_option, require_options, require_path, require_positive,
+                    require_unmasked, retold)
 from .curve import Curve, axis_of, derivative_of
 from .mapping import SECTIONS, MappingBeam, heights_of, scaled
 from .numbering import NODAL, ElementBeamP1, NumberedMesh, default_tags, halved
@@ -230,13 +230,10 @@ class MeshBeam(NumberedMesh):
         (8, 3.1416)
         """
         curve, s = axis_of(points, elements, noise)
-        try:
+        with retold(MeshError, "the axis through the points: {error}. Give points in order along "
+                    "the axis; measured points need {}, a corner two beams and a weld",
+                    f"more than noise={noise:g}" if noise else "noise=", error=MeshError):
             return cls.init_curve(curve, s, height, curve.derivative())
-        except MeshError as error:
-            more = f"more than noise={noise:g}" if noise else "noise="
-            raise MeshError(f"the axis through the points: {error}. Give points in order along the "
-                            f"axis; measured points need {more}, a corner two beams and a weld"
-                            ) from None
 
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
@@ -641,7 +638,7 @@ class MeshBeam(NumberedMesh):
             if getattr(facets, "ori", None) is not None:
                 content[f"o_{name}"] = facets.ori
         content |= {f"s_{name}": elements for name, elements in (self.subdomains or {}).items()}
-        with archive.writing(path):
+        with retold(OSError, "cannot write {!r}: {error}", str(path), error=FileError):
             archive.write(path, content)
 
     @classmethod
@@ -693,7 +690,8 @@ class MeshBeam(NumberedMesh):
 
         refuse(not path.suffix, "the file name {!r} has no suffix: end it with .npz, .vtu or "
                "another format of meshio", str(path), error=FileError)
-        with archive.writing(path, (OSError, meshio.ReadError, meshio.WriteError, SystemExit)), (
+        kinds = OSError, meshio.ReadError, meshio.WriteError, SystemExit
+        with retold(kinds, "cannot write {!r}: {error}", str(path), error=FileError), (
                 contextlib.nullcontext(path) if path.suffix in IN_PARTS else archive.replacing(path)
                 ) as new:
             self.to_meshquad().save(new, point_data, cell_data, **kwargs)

@@ -17,7 +17,7 @@ from ..beam import (Beam, BeamPoints, Domain, by_history, displacement_strain, g
 from ..beam.strains import stress_at, stretched
 from ..core import (Array, CallbackError, InputError, NameUnknown, ask, first_order, refuse,
                     require_finite_scalar, require_flag, require_integer, require_label,
-                    require_text, shown, step, stress_of)
+                    require_text, retold, shown, step, stress_of)
 from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from .recovered import Recovery
@@ -96,14 +96,12 @@ class Field:
         out = ask("the function of a field", self.function, values) if own else (
             self.function(values))
         shape = (values.n,) if self.components == 1 else (self.components, values.n)
-        try:
+        with retold((TypeError, ValueError), "the field {!r} must be an array of numbers, got {!r}",
+                    self.name, out, error=CallbackError):
             out = np.asarray(out, dtype=float)
-        except (TypeError, ValueError):
-            raise CallbackError(f"the field {self.name!r} must be an array of numbers, got "
-                                f"{shown(out)}") from None
-        if out.shape not in (shape, ()) or (out.ndim == 0 and not np.isfinite(out)):
-            raise CallbackError(f"the field {self.name!r} must have shape {shape} at {values.n} "
-                                f"points, got {out if out.ndim == 0 else out.shape}")
+        refuse(out.shape not in (shape, ()) or (out.ndim == 0 and not np.isfinite(out)),
+               "the field {!r} must have shape {} at {} points, got {}", self.name, shape, values.n,
+               out.shape or out, error=CallbackError)
         return np.broadcast_to(out, shape)
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..beam import Beam, drawn
-from ..core import (Array, InputError, refuse, require_flag, require_integer, require_like, shown,
+from ..core import (Array, InputError, refuse, require_flag, require_integer, require_like, retold,
                     tensor)
 from .fields import DomainValues, Field, Values, values_on_grid
 
@@ -52,11 +52,9 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
     # ``subdivide`` is the number of quads along and across an element; with ``lagrange`` an element
     # is one Lagrange cell.
     require_like("state", state, "State", "beams", "u_of")
-    try:
+    with retold((TypeError, ValueError), "subdivide must be two positive integers up to {}, along "
+                "and across an element, got {!r}", MAX_SUBDIVISION, subdivide):
         m, n = (require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in subdivide)
-    except (TypeError, ValueError, InputError):
-        raise InputError(f"subdivide must be two positive integers up to {MAX_SUBDIVISION}, along "
-                         f"and across an element, got {shown(subdivide)}") from None
     lagrange, recover = require_flag("lagrange", lagrange), require_flag("recover", recover)
     total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
     if total > MAX_POINTS and not lagrange:

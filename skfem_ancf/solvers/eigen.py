@@ -9,7 +9,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from ..core.band import NO_FACTORS, fix
 from ..core import (Array, ConvergenceError, InputError, ModelWarning, SupportError, refuse,
-                    require_integer, warn)
+                    require_integer, retold, warn)
 from ..equations.matrices import Inverse, StrainTangent, is_symmetric
 from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes
@@ -317,11 +317,9 @@ def _prestressed(system):
            "state.stability of scene.solve_static(stable=False), or scene.modes(k, state)")
     search = Search(system, None, None, Steps("newton", 1e-8, 30, 1.0, 1e-4), False, False)
     search.route = Route(zero, loads=(0.0, 0.0), times=(0.0, 0.0))
-    try:
+    with retold(LoadStepFailed, "no equilibrium without loads was found for what springs and "
+                "energies push then: {error}. Give buckling() a state"):
         found = search.load_steps("newton")
-    except LoadStepFailed as failure:
-        raise InputError("no equilibrium without loads was found for what springs and energies "
-                         f"push then: {failure}. Give buckling() a state") from None
     return State(system, found.u, 0.0, found.force, multipliers=found.multipliers)
 
 

@@ -13,7 +13,7 @@ from ..actions.obstacles.outlines import AROUND, around
 from ..beam import WhichBeam
 from ..core import (ArrayLike, InputError, StrPath, refuse, require_flag, require_integer,
                     require_like, require_module, require_option, require_path, require_positive,
-                    require_text, shown)
+                    require_text, retold)
 from ..core.archive import output_file
 from ..recovery.fields import FIELDS, unit_of, units_of
 from ..recovery.grids import layout
@@ -523,11 +523,9 @@ def animate(history: Any, filename: StrPath, field: Any = None, *,
 
 def pixels(name: str, size: Any) -> tuple[int, int]:
     """Check width and height of a picture in pixels; ``name`` is that of the argument."""
-    try:
+    with retold((TypeError, ValueError), "{} must be two integers from {} to {}, the width and "
+                "height in pixels, got {!r}", name, *PIXELS, size):
         width, height = (require_integer(name, k, *PIXELS) for k in size)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be two integers from {PIXELS[0]} to {PIXELS[1]}, the width "
-                         f"and height in pixels, got {shown(size)}") from None
     return width, height
 
 

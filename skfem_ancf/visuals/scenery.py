@@ -16,8 +16,8 @@ from ..actions.obstacles.outlines import AROUND, around, outlines
 from ..actions.places import Vector
 from ..actions.symbols import LOADS, Symbol
 from ..beam import Layout
-from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar, require_flag,
-                    require_positive, require_unmasked, shown)
+from ..core import (AncfError, Array, refuse, require_finite_scalar, require_flag, require_positive,
+                    require_unmasked, retold)
 from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_in, unit_of, units_of,
                                values_on_grid, with_unit)
 from ..recovery.grids import Grid, grids, in_space
@@ -138,10 +138,8 @@ def _scale(scale, found):
 def _limits(limits, values, field):
     require_unmasked("limits", limits)
     if limits is not None:
-        try:
+        with retold((TypeError, ValueError), "limits must be two numbers, got {!r}", limits):
             low, high = limits
-        except (TypeError, ValueError):
-            raise InputError(f"limits must be two numbers, got {shown(limits)}") from None
         low, high = require_finite_scalar("limits", low), require_finite_scalar("limits", high)
         refuse(not low < high, "limits must increase, got {!r}", limits)
         return low, high

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core import (Array, ArrayLike, CallbackError, Immutable, InputError, ask, refuse,
-                     refuse_any, require_direction, require_finite, require_flag, require_function,
+from ...core import (Array, ArrayLike, CallbackError, Immutable, ask, refuse, refuse_any,
+                     require_direction, require_finite, require_flag, require_function,
                      require_not_negative, require_positive, warnings_as_errors)
 from ..contact.gap import outline
 from ..contact.tables import CUSTOM, OUTLINE
@@ -266,20 +266,18 @@ def _require_simple(points):
     sides = np.roll(points, -1, axis=0) - points
     refuse_any(np.hypot(*sides.T) <= 1e-12 * np.abs(points).max(), "the corner {k} of the polygon, "
                "{:g}, and the next are one place: leave one of them out", points.T)
-    for i in range(n):
-        for j in range(i + 1, n):
-            a, b, c, d = points[i], points[(i + 1) % n], points[j], points[(j + 1) % n]
-            beside = j == i + 1 or (i == 0 and j == n - 1)
-            crosses = (_cross(b - a, c - a) * _cross(b - a, d - a) < 0
-                       and _cross(d - c, a - c) * _cross(d - c, b - c) < 0)
-            if beside:  # they may fold back on each other
-                shared, p, q = (b, a, d) if j == i + 1 else (a, b, c)
-                p, q = p - shared, q - shared
-                crosses = _cross(p, q) == 0.0 and p @ q > 0.0
-            if crosses:
-                raise InputError(f"the sides {i} and {j} of the polygon, from {_pair(a)} to "
-                                 f"{_pair(b)} and from {_pair(c)} to {_pair(d)}, cross: give its "
-                                 "corners in order, round what is solid")
+    for i in range(n - 1):
+        j = np.arange(i + 1, n)
+        a, b, c, d = points[i], points[i + 1], points[j], points[(j + 1) % n]
+        side, other = b - a, d - c
+        crosses = (_cross(side, c - a) * _cross(side, d - a) < 0) & (
+            _cross(other, a - c) * _cross(other, b - c) < 0)
+        # neighbours may fold back on each other
+        folds = (_cross(side, other) == 0.0) & (other @ side < 0.0)
+        beside = (j == i + 1) | ((i == 0) & (j == n - 1))
+        refuse_any(np.where(beside, folds, crosses), "the sides {} and {} of the polygon, from "
+                   "{:g} to {:g} and from {:g} to {:g}, cross: give its corners in order, round "
+                   "what is solid", i, j, tuple(a), tuple(b), c.T, d.T)
 
 
 class SignedDistance(Shape):
