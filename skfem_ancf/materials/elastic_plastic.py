@@ -313,7 +313,9 @@ class ElasticPlastic(HistoryMaterial):
 
     def energy(self, strain: Array, history: Array) -> Array:  # type: ignore[override]
         if self.plane == "stress":
-            return super().energy(strain, history) + self._locked(history)
+            x = strain - history[:3]
+            return 0.5 * np.sum(x * np.tensordot(self.elastic, x, 1), axis=0) + (
+                self._locked(history))
         b = history[3:6]
         volume, x = self._deviators(strain, history)
         s = x + np.array([b[0], b[1], b[2], -b[0] - b[1]])
@@ -322,7 +324,9 @@ class ElasticPlastic(HistoryMaterial):
         return 0.5 * bulk * volume**2 + 0.25 * square / self.G + self._locked(history)
 
     def axial_energy(self, strain: Array, history: Array) -> Array:
-        return super().axial_energy(strain, history) + self._locked(history)
+        if self.plane == "strain":
+            return super().axial_energy(strain, history) + self._locked(history)
+        return 0.5 * self.E * (strain - history[0]) ** 2 + self._locked(history)
 
     def _locked(self, history):
         """Energy that hardening stores."""

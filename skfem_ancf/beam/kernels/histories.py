@@ -51,6 +51,9 @@ def remembering(elements: Sequence[Elements], past: Past) -> list[Elements]:
 
 #: Relative difference of strains that is round-off.
 SAME = 1e-12
+#: What copies of elements share.
+CONSTANT = ("weights", "constant", "_G_ends", "_to_moduli", "_ends", "_products", "_signs",
+            "_at_band")
 
 
 class ElementsWithHistory(Elements):
@@ -73,6 +76,8 @@ class ElementsWithHistory(Elements):
 
     def remembering(self, history: Array, span: Array, now: Array) -> ElementsWithHistory:
         """A copy with another history, time span and eigenstrains at the end, see :class:`Past`."""
+        for name in CONSTANT:  # made once for all copies
+            getattr(self, name)
         other = copy(self)
         other._own(history, span, now)
         return other
