@@ -41,6 +41,8 @@ CHANGED = 1e-9
 MISSED = 1e-6
 #: The arrays of a motion on which the next step depends, and what else readings depend on.
 NAMES, READ = ("u", "v", "acceleration", "algorithmic", "force"), ("multipliers",)
+#: Their sizes: those of DOFs or of joints.
+START, END = "uuuum", "uuuumm"
 
 
 class MotionDesign(Design):
@@ -246,7 +248,7 @@ class _Step:
     def __init__(self, design: MotionDesign, y: Motion, before: Motion | None) -> None:
         system = self._system = design._built.system
         c, self.y, self._design = system.constraints, y, design
-        self._before = self._kept = None
+        self._before, self._kept = (), None
         self._h = h = design.dt if before is None else y.t - before.t
         alpha_m, alpha_f, beta, gamma = design.scheme.parameters
         b, self._kick, q = 1.0 / (beta * h**2), (1.0 - alpha_m) / (1.0 - alpha_f), 1.0 - alpha_f
@@ -326,36 +328,44 @@ class _Step:
         early, late = (c.sparse_jacobian(y.u + x * y.v + 0.5 * x * x * y.acceleration, y.t + x)
                        for x in (-s, s))
         slope, bend = (late - early) / (2.0 * s), (late - 2.0 * J + early) / s**2
-        none, N, m = [None, None], sparse.eye_array(c.N), sparse.eye_array(c.m)
-        out = {(0, 0): N, (1, 2): N, (2, 4): N, (3, 4): N, (4, 5): m, (5, 5): m}
+        none, out = [None, None], {(0, 0): 1.0, (1, 2): 1.0, (2, 4): 1.0, (3, 4): 1.0, (4, 5): 1.0,
+                                   (5, 5): 1.0}
         if self._raw is not None:
             first, second, third = K + to_v * D + to_a * M, turned[0] - to_v * M, [
                 turned[1] - to_a * M, None, *none]
             joints, free = J, sparse.diags_array(c.free * 1.0)
             by_v, by_a = D @ free, sparse.csr_array(system.mass.tocsc()) @ free
-            rates = list(enumerate(zip(self._v, self._a)))
-            self._before = self._blocks({
-                **{(0, k): v * by_v + a * by_a for k, (v, a) in rates},
-                **{(2, k): -v * by_a for k, (v, a) in rates},
-                **{(4, k): -a * by_a for k, (v, a) in rates}}, "umumum", "uuuum")
-            self._kept = self._blocks({(3, k): f * N for k, f in enumerate(self._w)})
-            out |= {(3, 4): N / self._kick, (5, 1): m}
+            rates = {(i, k): x for i, row in enumerate((self._v, self._a))
+                     for k, x in enumerate(row)}
+            self._before = (self._map(rates, "uu", START), self._map(
+                {(0, 0): by_v, (0, 1): by_a, (2, 0): -by_a, (4, 1): -by_a}, "umumum", "uu"))
+            self._kept = self._map({(3, k): x for k, x in enumerate(self._w)}, END, START)
+            out |= {(3, 4): 1.0 / self._kick, (5, 1): 1.0}
         else:
             first, joints = (M, J) if design.state is None else matrices_of(
                 system, design.state)[2::2]
             second, third = turned[0], [K, None, D, None]
-        self._after = self._blocks(out, columns="umumum")
+        self._after = self._map(out, END, "umumum")
         return _factors([
             [first, joints.T, *none, *none], [joints, *none, *none, None],
             [second, None, M, J.T, *none], [slope, None, J, None, *none],
             [*third, M, J.T], [bend, None, 2.0 * slope, None, J, None]], K + M / h**2, c, h)
 
-    def _blocks(self, entries, rows="uuuumm", columns="uuuum"):
-        """A sparse matrix of blocks by place, with rows and columns of as many DOFs or joints."""
+    def _map(self, blocks, rows, columns):
+        """A function of x, also transposed, by blocks: numbers or sparse matrices, with rows and
+        columns "u" of DOFs or "m" of joints."""
         sizes = {"u": len(self.y.u), "m": len(self.y.multipliers)}
-        return sparse.block_array([[entries.get((i, j), sparse.csr_array((sizes[r], sizes[c])))
-                                    for j, c in enumerate(columns)] for i, r in enumerate(rows)],
-                                  format="csr")
+
+        def applied(x, back=False):
+            to, of = (columns, rows) if back else (rows, columns)
+            parts = np.split(x, np.cumsum([sizes[one] for one in of])[:-1])
+            out = [np.zeros((sizes[one], *x.shape[1:])) for one in to]
+            for (i, j), A in blocks.items():
+                i, j, A = (j, i, getattr(A, "T", A)) if back else (i, j, A)
+                out[i] += A @ parts[j] if sparse.issparse(A) else A * parts[j]
+            return np.concatenate(out)
+
+        return applied
 
     # With F_z dz + B dy0 + F_p dp = 0 for the unknowns z, the instant is dy = A dz + K dy0, where
     # y0 is the one before, in the order of NAMES.
@@ -368,19 +378,22 @@ class _Step:
     def forward(self, change: Array, old: Array | None) -> Array:
         """Derivatives of this instant (..., n), from those of the equations and of the instant
         before."""
-        c = self._system.constraints
+        c, right = self._system.constraints, -change
         self.require_held(change[:c.N][c.fixed])
         if old is None:
-            return self._after @ self._solver.solve(-change)
-        old = old[:4 * c.N + c.m]
-        return self._after @ self._solver.solve(-change - self._before @ old) + self._kept @ old
+            return self._after(self._solver.solve(right))
+        moved = old = old[:4 * c.N + c.m]
+        for one in self._before:
+            moved = one(moved)
+        return self._after(self._solver.solve(right - moved)) + self._kept(old)
 
     def backward(self, bars: Array) -> tuple[Array, Array]:
         """The adjoint of the equations, and derivatives by the instant before, from those by this
         instant."""
-        found = self._solver.solve(self._after.T @ bars, "T")
-        return found, bars if self._before is None else (
-            self._kept.T @ bars - self._before.T @ found)
+        moved = found = self._solver.solve(self._after(bars, True), "T")
+        for one in self._before[::-1]:
+            moved = one(moved, True)
+        return found, self._kept(bars, True) - moved if self._before else bars
 
 
 class _MeanStep(_Step):
@@ -420,7 +433,6 @@ class _MeanStep(_Step):
     def _linearised(self):
         system, y, start, h, c, t = (self._system, self.y, self._begin, self._h,
                                      self._system.constraints, self._t)
-        N, m, more = sparse.eye_array(c.N), sparse.eye_array(c.m), 1.0 + self._ahead
         M, u, force = sparse.csr_array(system.mass.tocsc()), self._middle, partial(_mean, system, t)
         late = _by_columns(self._design, lambda x: force(start.u, x), y.u, t, True)
         early = _by_columns(self._design, lambda x: force(x, y.u), start.u, t, True)
@@ -437,14 +449,14 @@ class _MeanStep(_Step):
                       lambda x: c.curvature(x, t, self._impulse)))
         turned = 0.5 * (c.curvature(u, t, self._force) + third)
         A = late + turned + 2.0 / h**2 * M
-        self._before = self._blocks({
+        self._before, more = (self._map({
             (0, 0): early + turned - 2.0 / h**2 * M, (0, 1): 0.25 * kick - 2.0 / h * M,
-            (2, 0): 0.5 * kick + 2.0 / h * M, (2, 1): M}, "umum", "uuuum")
-        self._after = self._blocks({
-            (0, 0): N, (1, 2): N, (2, 2): more / h * N, (3, 2): N / h, (4, 1): m, (4, 3): m / h,
-            (5, 1): more * m, (5, 3): more / h * m}, columns="umum")
-        self._kept = self._blocks({(2, 1): -more / h * N, (2, 3): (1.0 - more) * N,
-                                   (3, 1): -1.0 / h * N, (5, 4): (1.0 - more) * m})
+            (2, 0): 0.5 * kick + 2.0 / h * M, (2, 1): M}, "umum", START),), 1.0 + self._ahead
+        self._after = self._map({
+            (0, 0): 1.0, (1, 2): 1.0, (2, 2): more / h, (3, 2): 1.0 / h, (4, 1): 1.0,
+            (4, 3): 1.0 / h, (5, 1): more, (5, 3): more / h}, END, "umum")
+        self._kept = self._map({(2, 1): -more / h, (2, 3): 1.0 - more, (3, 1): -1.0 / h,
+                                (5, 4): 1.0 - more}, END, START)
         J = c.sparse_jacobian(y.u, y.t)
         slope = (c.sparse_jacobian(y.u + s * y.v, y.t + s)
                  - c.sparse_jacobian(y.u - s * y.v, y.t - s)) / (2.0 * s)
