@@ -248,7 +248,8 @@ class _Step:
     def __init__(self, design: MotionDesign, y: Motion, before: Motion | None) -> None:
         system = self._system = design._built.system
         c, self.y, self._design = system.constraints, y, design
-        self._before, self._kept = (), None
+        self._before: tuple[Any, ...] = ()  # none at the start
+        self._kept: Any = None
         self._h = h = design.dt if before is None else y.t - before.t
         alpha_m, alpha_f, beta, gamma = design.scheme.parameters
         b, self._kick, q = 1.0 / (beta * h**2), (1.0 - alpha_m) / (1.0 - alpha_f), 1.0 - alpha_f
