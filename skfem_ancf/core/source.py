@@ -117,12 +117,12 @@ def everywhere(condition):
     return np.all(condition)
 
 
-def room(shape):
+def room(shape: Any) -> Any:
     """An array for work. Compiled code has it on the stack until the function marked by
     :func:`apart` ends: not for loops, nor for what grows with the scene."""
     return np.empty(shape)
 
 
-def shaped(x, shape):
+def shaped(x: Any, shape: Any) -> Any:
     """A reshaped view of a contiguous array."""
     return x.reshape(shape)
