@@ -195,7 +195,7 @@ def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_pat
         with pytest.warns(CompilationWarning, match="each process compiles again.*NUMBA_CACHE_DIR"):
             s.integrate(0.3, 1e-3, t_eval=[0.3])
         assert not loads  # it would not pay
-        assert backend.Backend(s.system).choose("steps").way == "plain"
+        assert backend.Backend(s.system).choose("steps").mode == "plain"
     finally:
         for function in code_cache.folder, code_cache.can_keep, code_cache._warn_of:
             function.cache_clear()

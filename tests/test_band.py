@@ -52,14 +52,14 @@ def test_compiled_bands_are_the_dense_matrices(storage, sign, compiled):
 @pytest.fixture(scope="module")
 def compiled():
     from skfem_ancf.core.jit import entry
-    from skfem_ancf.core.words import Words
+    from skfem_ancf.core.packed import Packed
 
     x, A = np.zeros(2), matrix(2, 1, "symmetric", 1)[1]
     found = [entry(f, (A, *args)) for f, *args in (
         (band_product, x, x), (band_factors,), (band_solution, x))]
 
     def called(run, A, *args):
-        words = Words(A)  # lives as long as the call: the kernel gets an address only
+        words = Packed(A)  # lives as long as the call: the kernel gets an address only
         return run(words.address, *args)
 
     return [partial(called, run) for run in found]

@@ -23,7 +23,7 @@ def at_once(monkeypatch):
 
 def ways(scene):
     """Which way statics and time steps of a scene run."""
-    return [scene.system.backend.choose(name).way for name in ("equilibrium", "steps")]
+    return [scene.system.backend.choose(name).mode for name in ("equilibrium", "steps")]
 
 MESHES = {
     "equal": lambda: MeshBeam.init_line(np.linspace(0, 1, 5), 0.1),

@@ -405,7 +405,7 @@ def test_compiled_motions_are_those_of_numpy(monkeypatch, needs_compiled, scheme
         for one in (scene, alone.gravity((0.0, -9.81))):
             history = one.integrate(0.02, 5e-4, scheme=scheme)
             found.append((history.u, history.v))
-            assert one.system.backend.choose("steps").way == ("loaded" if mode == "1" else "plain")
+            assert one.system.backend.choose("steps").mode == ("loaded" if mode == "1" else "plain")
     for numpy, compiled in zip(found[:2], found[2:]):
         for a, b in zip(numpy, compiled):
             assert_allclose(b, a, rtol=0, atol=1e-9 * np.abs(a).max())

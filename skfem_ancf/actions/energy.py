@@ -50,7 +50,7 @@ class Density(Load):
     The six variables ``y``, (6, n, np), are r_0, r_1, F_00, F_01, F_10, F_11. A subclass defines
     ``_slope(y, part)``, the derivatives of the density, (6, n, np), and ``_curvature(y, part)``,
     the second derivatives (6, 6, n, np), the differentiation last. ``_parts`` are the
-    :class:`Points`, known once bound.
+    :class:`DensityPoints`, known once bound.
     """
 
     constant = False

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..beam import TURN, Beam, Layout, Points, RigidBody, WhichBeam, WhichMember, on_body
+from ..beam import TURN, Beam, Layout, PointLocator, RigidBody, WhichBeam, WhichMember, on_body
 from ..beam.distribution import Distribution, on_points
 from ..beam.kernels.section import beam_gradients
 from ..beam.kinematics import locate, probe_reference
@@ -311,7 +311,7 @@ class FollowerForce(DirectedForce):
             bound._place, bound._start = None, beam.q0[2:]
             bound._along, bound._slopes = beam.direction()
         else:
-            found = Points([beam], [slice(beam.N)]).find(as_point(self.at, beam.mesh), beam,
+            found = PointLocator([beam], [slice(beam.N)]).find(as_point(self.at, beam.mesh), beam,
                                                          self.line, ask=True).parts[0]
             e, X = int(found.e[0]), found.X[:, 0]
             if is_off_axis(beam, X):

@@ -6,7 +6,7 @@ from .solid import PiolaForm, PiolaTangent, displacement_strain, moduli_at, scat
 from .domain import Domain, DomainPoints, drawn, grade_of
 from .rigid import RigidBody, on_body
 from .layout import Layout, WhichBeam, WhichMember, select_beam, select_member
-from .points import BeamPoints, Located, Points, require_body
+from .points import BeamPoints, Located, PointLocator, require_body
 from .remembered import by_history, cable_forces, has_history, remembers, with_history
 
 __all__ = ["Beam", "RigidBody", "reference_coordinates"]

@@ -172,7 +172,7 @@ class Located:
         return self.gather([part.start for part in self.parts])
 
 
-class Points:
+class PointLocator:
     """Locates points in beams and bodies; ``lines`` are the line numbers of the chains of a frame.
     """
 

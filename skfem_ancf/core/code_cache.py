@@ -28,7 +28,7 @@ class NotCompiled(Exception):
 _MARKS = re.compile(rb"^\s*(@source|@primitive|@apart|import numba|from (numba|\.+source) |"
                     rb"from \.+core import (\([^)]*|[^(\n]*)"
                     rb"\b(source|primitive|apart|indices|[FI][123])\b)", re.MULTILINE)
-_ALSO = "loops.py", "words.py"
+_ALSO = "loops.py", "packed.py"
 
 
 @cache

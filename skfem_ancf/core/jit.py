@@ -23,7 +23,7 @@ from numba.extending import (intrinsic, lower_builtin, lower_getattr_generic, mo
 from .callbacks import kept as keeping
 from .code_cache import cannot_keep, can_keep, key, nothing_collected, verified
 from .source import APART, MADE, MARKED, PYTHON, apart, room, shaped
-from .words import Words, hints
+from .packed import Packed, hints
 
 
 # without "nnan" and "ninf", since strains that are not finite must be detected
@@ -154,7 +154,7 @@ def load_part(part: str) -> None:
 
 
 class Record(types.NamedTuple):
-    """A named tuple by the address of its :class:`~skfem_ancf.core.words.Words`. Fields are read
+    """A named tuple by the address of its :class:`~skfem_ancf.core.packed.Packed`. Fields are read
     where they are used. Tuples of many arrays by value take Numba ten times as long, since it
     counts all references."""
 
@@ -214,7 +214,7 @@ def _array(context, builder, kind, data, shape):
 
 @cache
 def reader(kind: Any) -> Any:
-    """A compiled function from the address of :class:`~skfem_ancf.core.words.Words` to a Record."""
+    """A compiled function from the address of a :class:`~skfem_ancf.core.packed.Packed` tuple."""
     made = Record(kind)
 
     @intrinsic
@@ -324,7 +324,7 @@ def entry(function: Any, args: Any) -> Any:
     tuples = [k for k, x in enumerate(args) if k > 0 and isinstance(x, tuple)]
     flat = [k for k in reversed(tuples) if _of_numbers(args[k])]  # the last first
     tuples = [k for k in tuples if k not in flat]
-    known: dict[int, Words] = {}
+    known: dict[int, Packed] = {}
 
     def call(*args):
         numbers, alive = list(args), ()  # other threads may forget words
@@ -351,9 +351,9 @@ LAST = 16
 
 
 def _words(x, known):
-    """Words of a tuple that is not known."""
+    """A tuple that is not known, packed."""
     known.pop(id(x), None)
-    known[id(x)] = found = Words(x)
+    known[id(x)] = found = Packed(x)
     if len(known) > LAST:
         del known[next(iter(known))]
     return found

@@ -17,7 +17,7 @@ from ..actions.tables import constraint, joint_directions
 from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core.callbacks import handle_of
 from ..core import I1, Array, ConvergenceError, SupportError, refuse, require_positive
-from ..core.words import hints
+from ..core.packed import hints
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate

@@ -51,7 +51,7 @@ _worked = 0.0
 class Choice(NamedTuple):
     """"plain", "loaded" or "compiled", and the reason."""
 
-    way: str
+    mode: str
     reason: str
 
 
@@ -163,12 +163,12 @@ class Backend:
         # ``iterations`` are those of the work that is done with it. With ``calls`` it calls Python.
         # NumPy may warn of overflow.
         global _worked
-        way, name = self.choose(kernel.__name__, iterations).way, kernel.__name__
-        if way == "plain":
+        mode, name = self.choose(kernel.__name__, iterations).mode, kernel.__name__
+        if mode == "plain":
             _worked += self.seconds(iterations)
             return self._in_numpy(kernel)
         calls = calls or self.tables.calls_back
-        if way == "loaded":
+        if mode == "loaded":
             return self._bound(name, calls)
         loaded: list[Any] = []
 

@@ -17,7 +17,7 @@ from ..beam import Beam, RigidBody
 from ..core.band import dense
 from ..core import Array, InputError, ModelWarning, SupportError, cached_property, is_builtin, shown
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
-from .signature import DENSE, FREE, first_dependent
+from .rank import DENSE, FREE, first_dependent
 
 #: Largest number of multipliers with dense Jacobians.
 FEW = 96
@@ -435,7 +435,7 @@ class Constraints:
                 f"{value:g} if the motion starts from the displaced static state")
 
     def _dependent(self):
-        """The first dependent equation, see :func:`.signature.first_dependent`."""
+        """The first dependent equation, see :func:`.rank.first_dependent`."""
         zero = np.zeros(self.N)
         return first_dependent(self._at_rest * self.coordinate_sizes, self.free,
                                lambda: self.constraint(zero, 0.0))

@@ -11,7 +11,7 @@ from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
 from ..core import F1, F3, is_builtin
 from ..core.jit import address, caller, compiled, reader
-from ..core.words import Words
+from ..core.packed import Packed
 from ..actions.contact.pairs import Candidates, PairTables
 from ..actions.contact.tables import Pair
 from .tables import Equations
@@ -46,7 +46,7 @@ def custom_evaluate(handle, strain, out):
 
 @lru_cache(64)
 def _words_of(pattern):
-    return Words(compiled_pattern(pattern))
+    return Packed(compiled_pattern(pattern))
 
 
 @cache
@@ -75,9 +75,9 @@ def _of_points(point):
     return of_points
 
 
-def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
+def flat(plain: Equations) -> tuple[Equations, Packed, list[Packed]]:
     """The equations for compiled code, their words, and those that must live as long."""
-    words: list[Words] = []
+    words: list[Packed] = []
     loads = plain.loads
     body = _flat_body(plain.body, words)
     if len(loads.eigenstrains):
@@ -87,21 +87,21 @@ def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
     found = plain._replace(body=body, viscous=viscous, copies=copies, loads=loads,
                            forces=_flat_forces(plain.forces, words),
                            factors=plain.K._replace(flat=np.empty(plain.K.flat.size)))
-    return found, Words(found), words
+    return found, Packed(found), words
 
 
-def flat_after(flat: tuple[Equations, Words, list[Words]], plain: Equations
-               ) -> tuple[Equations, Words, list[Words]]:
+def flat_after(flat: tuple[Equations, Packed, list[Packed]], plain: Equations
+               ) -> tuple[Equations, Packed, list[Packed]]:
     """The same with the history of other equations."""
     words = list(flat[2])
     found = flat[0]._replace(forces=_flat_forces(plain.forces, words), history=plain.history,
                              span=plain.span)
-    return found, Words(found), words
+    return found, Packed(found), words
 
 
 def _flat_forces(forces, words):
     def flat(tables):
-        found = list(map(Words, tables.pairs))
+        found = list(map(Packed, tables.pairs))
         words.extend(found)
         return tables._replace(pairs=np.array([x.address for x in found], dtype=np.int64))
 
@@ -111,9 +111,9 @@ def _flat_forces(forces, words):
 
 
 def _flat_body(body, words):
-    found = [Words(_compiled(t)) for t in body.packs]
+    found = [Packed(_compiled(t)) for t in body.packs]
     words += found
-    return Words(FlatBody(np.array([x.address for x in found], dtype=np.int64), body.table))
+    return Packed(FlatBody(np.array([x.address for x in found], dtype=np.int64), body.table))
 
 
 def _compiled(t):

@@ -12,7 +12,7 @@ from scipy import sparse
 from ..actions.joints.nodes import chain_ends
 from ..beam import Domain, RigidBody
 from ..core import Array
-from .signature import DENSE, DEPENDENT, groups, null_space, row_sizes, unit_rows
+from .rank import DENSE, DEPENDENT, groups, null_space, row_sizes, unit_rows
 
 # redundant equations of joints
 

@@ -19,7 +19,7 @@ from ..actions.joints.base import UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..actions.tables import MATERIALS, carry_eigenstrains
-from ..beam import Beam, Domain, Points, RigidBody
+from ..beam import Beam, Domain, PointLocator, RigidBody
 from ..beam.kinematics import bent
 from ..core import Array, cached_property, refuse
 from ..core.band import BandMatrix
@@ -225,10 +225,10 @@ class System:
     # parts
 
     @shared
-    def points(self) -> Points:
+    def points(self) -> PointLocator:
         """Location of material points."""
         frame = self.constraints.frame
-        return Points(self.beams, self.slices, self.members[len(self.beams):],
+        return PointLocator(self.beams, self.slices, self.members[len(self.beams):],
                       None if frame is None else frame.lines)
 
     @cached_property

@@ -17,7 +17,7 @@ from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import CABLE, OF_H, linearised
 from ..core.callbacks import handle_of
-from ..core.words import constant
+from ..core.packed import constant
 from ..actions.loads import Load
 from ..actions.tables import JointTables, LoadTables
 

@@ -328,13 +328,13 @@ class _Page:
             if s.kind in ("support", "joint"):
                 rows.append((s.kind, place, s.text.replace(" ", ", ") or "fixed", ""))
                 continue
-            way = f"direction ({a:.3g}, {b:.3g})" if s.kind in ("force", "weight") else ""
+            direction = f"direction ({a:.3g}, {b:.3g})" if s.kind in ("force", "weight") else ""
             if len(s.at) > 1:
                 place = f"from {_pair(s.at[0].start)} to {_pair(s.at[-1].start)}"
             value = (rounded(s.value + 0.0, unit_of_load(s, self.units)),) if s.kind in (
                 "force", "moment", "weight", "mass") else ""
             rows.append(("distributed force" if s.per else s.kind, place,
-                         f"{s.text.removesuffix('= ')} {way}".strip(), value))
+                         f"{s.text.removesuffix('= ')} {direction}".strip(), value))
         for one in self.system.forces.contacts.obstacles:
             rows.append(("obstacle", "", repr(one.shape).strip("<>") + ", moves" * one.moves,
                          (f"friction {one.friction:g}",) if one.friction else ""))

@@ -70,7 +70,7 @@ def _side(*corners):
             a, b = ((points[n] - end) / np.hypot(*(points[n] - end)) for n in (k - 1, k + 1))
             half = 0.5 * np.arccos(a @ b)
             centre = end + (a + b) / np.hypot(*(a + b)) * r / np.sin(half)
-            end, after = (points[k] + r / np.tan(half) * way for way in (a, b))
+            end, after = (points[k] + r / np.tan(half) * side for side in (a, b))
         if (rise := end[1] - begin[1]) > TINY * high:
             rows.append((begin[1], *begin, (end[0] - begin[0]) / rise, 0.0))
         if r:

@@ -204,8 +204,8 @@ def _label(ax, lines, name, scale, least, size, unit):
                 places.append((abs(values[k]), values[k], tip, side, inward))
     taken: list[tuple[Array, Array]] = []
     for _, value, tip, side, inward in sorted(places, key=lambda one: -one[0]):
-        way = [a if abs(a) > 0.4 else c if abs(c) > 0.4 else 0.0 for a, c in zip(side, inward)]
-        middle = tip + 0.5 * size * np.sign(way) * [WIDE, HIGH]
+        towards = [a if abs(a) > 0.4 else c if abs(c) > 0.4 else 0.0 for a, c in zip(side, inward)]
+        middle = tip + 0.5 * size * np.sign(towards) * [WIDE, HIGH]
         if len(taken) < LABELS and all(
                 np.hypot(*(tip - other)) > APART * size and
                 np.any(np.abs(middle - center) > np.multiply([WIDE, HIGH], size))
@@ -215,5 +215,5 @@ def _label(ax, lines, name, scale, least, size, unit):
                 rounded(value, unit), tip, 4 * side + 3 * inward, textcoords="offset points",
                 fontsize=8, color=SIGNS[0] if value > 0 else SIGNS[1], gid=name, zorder=7,
                 path_effects=[withStroke(linewidth=2, foreground="white")],
-                ha=("center", "left", "right")[int(np.sign(way[0]))],
-                va=("center", "bottom", "top")[int(np.sign(way[1]))])
+                ha=("center", "left", "right")[int(np.sign(towards[0]))],
+                va=("center", "bottom", "top")[int(np.sign(towards[1]))])

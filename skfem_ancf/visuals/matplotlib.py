@@ -142,19 +142,19 @@ def _draw_contact(ax, scenery, state):
            "thickness=", scenery.note)
     x, size = found.points, float(np.max(np.ptp(scenery.every[:, :2], axis=0)))
     most = int(np.argmax(found.pressure))
-    way = found.force / np.maximum(np.hypot(*found.force), 1e-300)
-    tails = x - CONTACT * size * found.pressure / found.pressure[most] * way
+    direction = found.force / np.maximum(np.hypot(*found.force), 1e-300)
+    tails = x - CONTACT * size * found.pressure / found.pressure[most] * direction
     ax.add_collection(LineCollection(np.array([x, tails]).transpose(2, 0, 1), colors=LOAD,
                                      linewidths=0.8, zorder=4, gid="contact"))
     for stuck in (False, True):
         ax.plot(*x[:, found.sticking == stuck], "o", ms=3, mec=LOAD, mew=0.8, ls="", zorder=4.5,
                 mfc=LOAD if stuck else "white", gid="sticking" if stuck else "contact point")
     unit = unit_of(FIELDS["von_mises"], units_of(state))
-    ax.update_datalim(np.hstack([tails, tails - 0.05 * size * way]).T)
+    ax.update_datalim(np.hstack([tails, tails - 0.05 * size * direction]).T)
     ax.annotate("p = " + rounded(found.pressure[most], "" if unit == "force / area" else unit),
-                tails[:, most], tuple(-4 * way[:, most]), textcoords="offset points", fontsize=8,
-                color=LOAD, gid="contact pressure", ha="center",
-                va="top" if way[1, most] > 0 else "bottom")
+                tails[:, most], tuple(-4 * direction[:, most]), textcoords="offset points",
+                fontsize=8, color=LOAD, gid="contact pressure", ha="center",
+                va="top" if direction[1, most] > 0 else "bottom")
 
 
 def plot_scene(scene: Any, ax: Any = None, *, loads: bool = True, supports: bool = True,

@@ -490,9 +490,9 @@ class Sketch:
             x = np.array([0, 0.2, *np.linspace(0.25, 0.75, 8), 0.8, 1])
             y = np.array([0, 0, *np.tile([1, -1], 4), 0, 0])
             self._line(a + np.outer(x, along) + r * np.outer(y, across), s.kind)
-            for place, end, way in zip(s.at, at, (-along, along)):
+            for place, end, outwards in zip(s.at, at, (-along, along)):
                 if not place.dofs.size:
-                    self._ground(end, way / length, 1.2 * r, s.kind)
+                    self._ground(end, outwards / length, 1.2 * r, s.kind)
             if s.text:
                 self._text(s.text, 0.5 * (a + b) + r * across, across, HOLD, s.kind)
 

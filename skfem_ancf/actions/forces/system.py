@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ...core import Array
-from ...core.words import constant
+from ...core.packed import constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
@@ -387,8 +387,8 @@ class Forces:
 
     def moves_far(self, u: Array) -> Array:
         """True for steps between displacements (n + 1, N) that may lead through an element."""
-        way = np.max(np.abs(np.diff(u, axis=0)) * self.clear[SEEN + self._N:], axis=1)
-        return way >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
+        moved = np.max(np.abs(np.diff(u, axis=0)) * self.clear[SEEN + self._N:], axis=1)
+        return moved >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 
     def looks(self, u: Array, t: float, start: Array | None) -> Iterator[tuple[Any, Any]]:
         """Elements of bodies that touch each other, with what their ``look`` returns."""

@@ -12,7 +12,7 @@ import scipy
 
 from ...core import Array
 from ...core.callbacks import handle_of
-from ...core.words import Words
+from ...core.packed import Packed
 from ..contact.pairs import APART, EDGE, ON, Candidates, PairTables, facing, together
 from ..contact.plane import cross, dot
 from ..contact.tables import weights_of_motion
@@ -130,7 +130,7 @@ class Search:
             if len(wide.p):
                 break
             known, skin = wide, wider
-        t, self.candidates, self._words = self.tables, known, Words(known)
+        t, self.candidates, self._words = self.tables, known, Packed(known)
         t.found[0], t.skin[0], t.seen[:] = self._words.address, skin * self.height, z
 
     def _search(self, x, z, skin):

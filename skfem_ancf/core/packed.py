@@ -20,9 +20,9 @@ _NOTHING = c_char * 0
 T = TypeVar("T")
 
 
-class Words:
-    """The words of a named tuple, which live as long as this object. Fields are contiguous arrays
-    of floats or integers, numbers, named tuples or their Words."""
+class Packed:
+    """A named tuple as words, which live as long as this object. Fields are contiguous arrays of
+    floats or integers, numbers, or named tuples, packed or not."""
 
     def __init__(self, x: tuple[Any, ...]) -> None:
         found: list[int] = []
@@ -31,12 +31,12 @@ class Words:
         self.address, _ = self.words.buffer_info()
 
 
-_CONSTANT: dict[int, Words] = {}
+_CONSTANT: dict[int, Packed] = {}
 
 
 def constant(x: T) -> T:
     """A named tuple that lives as long as the process, whose words are made once."""
-    words = Words(cast("tuple[Any, ...]", x))
+    words = Packed(cast("tuple[Any, ...]", x))
     _CONSTANT[id(x)] = words
     return x
 
@@ -64,7 +64,7 @@ def _collect(x, found):
                 _collect(value, found)
             else:
                 found += known.words
-        elif isinstance(value, Words):
+        elif isinstance(value, Packed):
             found += value.words
         elif hint is float:
             found += _INTEGER.unpack(_FLOAT.pack(value))
