@@ -119,7 +119,8 @@ def test_which_scheme_a_motion_takes():
             (hinged, 1e-6, "radau", "joints"), (damped, 1e-6, "radau", "damping"),
             (damped, 1e-2, "generalized-alpha", "damping"),
             (rod(1e-3).clamp("left"), 1e-6, "radau", "no step resolves"),
-            (touching, 1e-6, "energy-momentum", "obstacles")):
+            (touching, 1e-6, "energy-momentum", "obstacles"),
+            (rod().contact("all", self_contact=True), 1e-6, "energy-momentum", "contact")):
         choice = choose_scheme(scene.system, rtol)
         assert choice.scheme.name == name and why in choice.reason
         assert repr(choose_scheme(scene.system).scheme) in scene.plan("dynamic")["scheme"]

@@ -213,11 +213,6 @@ def in_steps(scheme: Scheme) -> bool:
     return in_blocks(scheme) and not scheme.collocates
 
 
-def same_scheme(a: Scheme, b: Scheme) -> bool:
-    """True if two schemes have the same class and parameters."""
-    return type(a) is type(b) and repr(sorted(vars(a).items())) == repr(sorted(vars(b).items()))
-
-
 # divided differences over the steps of a motion, for error estimates
 
 #: Largest ratio dt |f^(k + 1)| / |f^(k)| in an extrapolation.

@@ -12,7 +12,7 @@ import numpy as np
 from ..core import Array, gauss, read_only, refuse, require_integer
 from ..equations.system import System
 from .base import Motion, Scheme, derivative, difference_row, grown
-from .stage_tangent import Method
+from .records import Method
 
 #: Fraction of a step below which accelerations are interpolated, with prescribed motions.
 NEAR = 3e-3

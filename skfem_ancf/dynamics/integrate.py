@@ -19,9 +19,9 @@ from ..equations.stability import largest_displacement
 from ..equations.system import System
 from ..results.state import State
 from .base import Motion, Scheme, in_steps
-from .choice import SCHEMES, get_scheme
 from .history import History
 from .run import Run, TimeStepFailed, task_of
+from .schemes import SCHEMES, get_scheme
 from .sensors import Sensor
 
 #: Interval in steps between checks for inverted elements.
@@ -71,24 +71,19 @@ def integrate(system: System, scheme: Scheme, start: State | None, u: Array | No
         file = Checkpoint(checkpoint, every, run)
         file.begin()
     history = follow(run, file, progress)
-    if require_flag("check", check):
-        history.error = _difference(history, begun, task, progress)
+    if require_flag("check", check):  # with half the step size
+        fine = replace(task, t_end=history.t[-1], t_eval=history.t,
+                       dt=None if task.dt is None else 0.5 * task.dt,
+                       rtol=task.rtol * 0.5**scheme.order)  # an error per unit of time
+        try:
+            other, _ = _go(begun(fine), None, progress)
+        except ConvergenceError:
+            history.error = np.nan
+        except Interrupted as stopped:
+            raise Interrupted(str(stopped), history) from None
+        else:
+            history.error = largest_displacement(system, other.u - history.u) / system.size
     return history
-
-
-def _difference(history, begun, task, progress):
-    """Largest difference from the motion with half the step size, over the size of the scene."""
-    system, scheme = history.system, history.scheme
-    fine = replace(task, t_end=history.t[-1], t_eval=history.t,
-                   dt=None if task.dt is None else 0.5 * task.dt,
-                   rtol=task.rtol * 0.5**scheme.order)  # an error per unit of time
-    try:
-        other, _ = _go(begun(fine), None, progress)
-    except ConvergenceError:
-        return np.nan
-    except Interrupted as stopped:
-        raise Interrupted(str(stopped), history) from None
-    return largest_displacement(system, other.u - history.u) / system.size
 
 
 def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:

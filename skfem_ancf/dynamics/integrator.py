@@ -14,7 +14,7 @@ import numpy as np
 from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.obstacles.contact import may_touch
 from ..actions.tables import constraint, joint_directions
-from ..core.band import BandMatrix, Coupling, coupling, factorize, fix, solve
+from ..core.band import SPARE, Band, BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core.callbacks import handle_of
 from ..core import I1, Array, ConvergenceError, SupportError, refuse, require_positive
 from ..core.packed import hints
@@ -23,14 +23,12 @@ from ..equations.system import System
 from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate
 from .collocation import Collocation
 from .time_functions import SAMPLES, TimeFunctions, rates
-from .energy_momentum import EnergyMomentum
-from .records import (FAILURES, Dampers, JointMotion, JointMotions, LowRankRows, Matrices,
-                      Multipliers, Rule, StepData, StepState, Vectors, Work,
+from .records import (FAILURES, Dampers, Interval, JointMotion, JointMotions, LowRankRows,
+                      Matrices, Multipliers, Rule, StageWork, StepData, StepState, Vectors, Work,
                       acceleration_of_joints, drive_rate, mass_factor, solve_rows)
-from .stage_tangent import Interval, new_points, solve_for
-from .stages import collocate
-from .steps import steps
-from .tangent import factors
+from .schemes import EnergyMomentum
+from .stages import collocate, solve_for
+from .steps import factors, steps
 
 
 # joint constraints at one instant: gap, Jacobian and rates
@@ -511,9 +509,18 @@ class StageIntegrator(Integrator):
 
     @cached_property
     def _work(self):
-        s, tables = self.system, self.system.backend.tables
-        return new_points(self.scheme.table.method, s.N, self.m, len(self._matrices.rows.P),
-                          tables.stresses.size, s.mass._replace(flat=np.zeros(s.mass.flat.size)))
+        s, N, m, rows = self.system, self.system.N, self.m, len(self._matrices.rows.P)
+        method, D = self.scheme.table.method, s.mass._replace(flat=np.zeros(s.mass.flat.size))
+        stresses = s.backend.tables.stresses.size
+        n, k, ld, b = len(method.points), method.values.shape[1], D.width + 1 + SPARE, m + rows
+        return StageWork._make([
+            np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
+            *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)),
+            np.zeros(2 * b), np.zeros((2 * b, 2 * b)), np.zeros((k, 2 * b, 2 * b)),
+            np.zeros((n, N)), np.zeros((k, 2 * N * ld)),
+            Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0), np.zeros((b, N)),
+            np.zeros((2 * k, b, N)), np.zeros((2, rows, rows)), np.zeros((2, m, N)),
+            np.zeros((m, m)), np.zeros(m), D, method])
 
     def _begin(self, y, dt, n, given):
         s, w, table, memory = self.system, self._work, self.scheme.table, y.memory or {}

@@ -16,7 +16,7 @@ from ..core import (AncfError, Array, CheckpointError, ModelWarning, ask_number,
                     warn)
 from ..equations.system import System
 from ..results.state import State
-from .base import COLUMNS, Motion, Scheme, in_blocks, interpolate, same_scheme
+from .base import COLUMNS, Motion, Scheme, in_blocks, interpolate
 from .history import History, state_of
 from .integrator import DEPTH, Integrator, StageIntegrator, TimeStepFailed
 from .sensors import Recorder, Sensor
@@ -232,7 +232,8 @@ class Run:
         motion = None if start is None else start._motion
         if start is not None and motion is not None:
             (scheme, arrays), v, turns = start._origin, motion.v, motion.turns
-            if same_scheme(scheme, self.scheme):
+            if type(scheme) is type(self.scheme) and (
+                    repr(sorted(vars(scheme).items())) == repr(sorted(vars(self.scheme).items()))):
                 if arrays is not None and len(start.u) == system.N and (
                         self._sizes is not None and "averages" in arrays):
                     self._size = min(float(arrays["size"]), task.span)

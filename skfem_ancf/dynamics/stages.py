@@ -6,18 +6,20 @@ step."""
 
 import numpy as np
 
-from ..core.band import add_multiple, clear, copy, multiply, solve, solve_joined
+from ..actions.forces.kernels import (add_elastic_force, add_element_damping, add_element_tangent,
+                                      element_damping, element_stiffness, put_between,
+                                      set_contact_rate)
+from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, add_load_stiffness,
+                              carry_eigenstrains, constraint, external_force, joint_directions)
 from ..beam.strain_energy import (add_force_of, add_viscous_stress, body_force, body_linearised,
-                                  body_mixed, body_stress)
-from ..actions.forces.kernels import add_elastic_force, set_contact_rate
-from ..core import indices, source
-from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, carry_eigenstrains,
-                              constraint, external_force, joint_directions)
+                                  body_mean_stress, body_mixed, body_stress, body_tangent)
+from ..core.band import (SPARE, add_multiple, clear, copy, factorize, factorize_complex,
+                         fix_stored, multiply, solve, solve_complex, solve_dependent, solve_joined)
+from ..core import indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
                                      SINGULAR, judged, noise_of_step)
-from .records import (ITERATIONS, JointMotion, acceleration_of_joints, damping_force, drive_rate,
-                      row_of, settle)
-from .stage_tangent import factorize_stages, flat_points, join, solve_for
+from .records import (ITERATIONS, JointMotion, acceleration_of_joints, add_damping,
+                      damping_force, drive_rate, row_of, settle)
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
 #: steps.
@@ -25,6 +27,181 @@ REUSED, MIXED, LASTING = 0.3, 0.5, 32
 #: Newton corrections of the joints at the end of a step.
 CLOSINGS = 2
 
+
+@source
+def flat_points(x):
+    """All points in one row, a view."""
+    return shaped(x, (x.size,))
+
+
+@source
+def factorize_stages(e, matrices, method, s, w, state, step):
+    """Factorise the iteration matrices at the mean of the points; False on failure."""
+    origin, f, S, yes = w.origins[0], w.x[0], w.stresses, w.x.size > 0
+    at, e.span[0] = step * (method.points.size + 1), s.h
+    for i in indices(origin.size):
+        origin[i] = 0.0
+    for k in range(method.points.size):
+        add_multiple(method.weights[k], w.U[k], origin)
+    for k in range(1, method.points.size):
+        copy(origin, w.origins[k])
+    if state.mixed_steps[0] > 0:
+        body_mean_stress(e.body, e.copies, method.weights, w.independent, S[1])
+    else:
+        body_stress(e.body, w.y[0], S[1])
+    body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
+    add_load_stiffness(e.loads, row_of(s.factors, at), s.times[at], 1.0, origin, e.K)
+    add_element_tangent(e.forces, s.times[at], origin, e.K)
+    D = w.D.flat
+    for i in indices(D.size):
+        D[i] = 0.0
+    if matrices.dampers.active > 0:
+        add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
+        if matrices.dampers.elements > 0:
+            add_element_damping(e.forces, s.times[at], origin, w.y[1], w.D)
+    if w.J.shape[0] > 0:
+        _rows(e, matrices, s, w, at)
+    for k in range(method.values.shape[1]):
+        a, b = method.values[0, k] / s.h, method.values[1, k] / s.h
+        if b != 0.0:
+            F = w.pairs[k]
+            half = F.size // 2
+            _combine(e.K, matrices.M, w.D, e.fixed, 1.0, a * a - b * b, a, F[:half])
+            _combine(e.K, matrices.M, w.D, e.fixed, 0.0, 2.0 * a * b, b, F[half:])
+            done = factorize_complex(F, e.K.width)
+        else:
+            _combine(e.K, matrices.M, w.D, e.fixed, 1.0, a * a, a, w.real.flat)
+            done = factorize(w.real)
+        if not done:
+            return False
+        for j in range(w.J.shape[0]):
+            x, y = w.Y[2 * k, j], w.Y[2 * k + 1, j]
+            copy(w.J[j], x)
+            for i in indices(y.size):
+                y[i] = 0.0
+            solve_for(w, k, x, y)
+        _between(w, s.h, k)
+    return True
+
+
+@source
+def _between(w, h, k):
+    """Schur complement of the low-rank rows for the eigenvalue k."""
+    q, Q, b, m, values = w.q, w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
+    for a in range(b):
+        for j in range(b):
+            re, im = np.dot(w.J[a], w.Y[2 * k, j]), np.dot(w.J[a], w.Y[2 * k + 1, j])
+            q[j, a], q[b + j, b + a], q[b + j, a], q[j, b + a] = re, re, -im, im  # its columns
+    if b > m:
+        for j in range(2 * b):
+            _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, q[j])
+    for a in range(m, b):
+        q[a, a] += 1.0
+        q[b + a, b + a] += 1.0
+    for a in range(2 * b):
+        for j in range(2 * b):
+            Q[a, j] = q[j, a]
+
+
+@source
+def _rows(e, matrices, s, w, at):
+    """Set the low-rank rows at the mean of the points, and the coupling of those of no joint."""
+    m, forces, t = w.l.shape[1], e.forces, s.times[at]
+    if m > 0:
+        joint_directions(e.joints, row_of(s.joints.g, at)[0], t, w.origins[0], w.J[:m])
+    for a in range(matrices.rows.P.shape[0]):
+        copy(matrices.rows.P[a], w.J[m + a])
+    for a in range(w.J.shape[0]):
+        J = w.J[a]
+        for i in indices(J.size):
+            J[i] *= e.free[i]
+    modes, D = matrices.dampers.modes.shape[0], np.empty(forces.size)
+    if w.S.shape[1] > modes:
+        element_stiffness(forces, t, w.origins[0], w.y[1], 0.0, D)
+        put_between(forces, D, 1.0, modes, w.S[0])
+        element_damping(forces, t, w.origins[0], w.y[1], D)
+        put_between(forces, D, 1.0, modes, w.S[1])
+    for a in range(modes):
+        w.S[1, a, a] = 1.0
+
+
+@source
+def _stiffen(S, p, z, m, column):
+    """The last rows of a column of ``q f = r`` times ``C = S[0] + (p + i z) S[1]``."""
+    k, b = S.shape[1], column.size // 2
+    scratch = np.empty(2 * k)
+    for a in range(k):
+        scratch[a], scratch[k + a] = column[m + a], column[b + m + a]
+    for a in range(k):
+        re, im = 0.0, 0.0
+        for c in range(k):
+            C, D = S[0, a, c] + p * S[1, a, c], z * S[1, a, c]
+            re += C * scratch[c] - D * scratch[k + c]
+            im += C * scratch[k + c] + D * scratch[c]
+        column[m + a], column[b + m + a] = re, im
+
+
+@source
+def solve_for(w, k, x, y):
+    """Solve in place with the factors of eigenvalue k; y is unchanged if that is real."""
+    if w.method.values[1, k] != 0.0:
+        solve_complex(w.pairs[k], w.real.width, x, y)
+    else:
+        solve(w.real, x)
+
+
+@source
+def join(method, s, w, k, r, q, x, y):
+    """Correct x + i y, solved with the band, by forces r along the low-rank rows J. For joints ``mu
+    / h J x = -gap``; the force of other rows is ``C J x``."""
+    m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
+    p, z = method.values[0, k], method.values[1, k]
+    c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
+    for a in range(b):
+        J = w.J[a]
+        r[a], r[b + a] = np.dot(J, x), np.dot(J, y)
+    for a in range(m):
+        re, im = 0.0, 0.0
+        for j in range(n):
+            re += method.to[0, k, j] * w.gaps[j, a]
+            im += method.to[1, k, j] * w.gaps[j, a]
+        r[a] += c * re - d * im
+        r[b + a] += c * im + d * re
+    if b > m:
+        _stiffen(w.S, p / s.h, z / s.h, m, r)
+    copy(flat_points(w.Q[k]), flat_points(q))
+    if not solve_dependent(q, r):
+        return False
+    for a in range(b):
+        re, im, f, g = w.Y[2 * k, a], w.Y[2 * k + 1, a], r[a], r[b + a]
+        for i in indices(x.size):
+            x[i] -= f * re[i] - g * im[i]
+            y[i] -= f * im[i] + g * re[i]
+    return True
+
+
+@source
+def _combine(K, M, D, fixed, c, m, d, out):
+    """``c K + m M + d D`` with the supports fixed, the lower half of each column."""
+    # Of an unsymmetric K, its symmetric part; the iteration corrects the rest.
+    ld, top = K.width + 1 + SPARE, K.top
+    n, x, y, z = out.size // ld, K.flat, M.flat, D.flat
+    columns = shaped(out, (n, ld))
+    if top > 0:
+        k, l, r = shaped(x, (n, K.ld)), shaped(y, (n, K.ld)), shaped(z, (n, K.ld))
+        for h in range(min(K.width + 1, n)):
+            for j in indices(n):
+                columns[j, h] = c * k[j, top + h] + m * l[j, top + h] + d * r[j, top + h]
+            later = k[h:]
+            for j in indices(n - h):
+                columns[j, h] += 0.5 * c * (later[j, top - h] - k[j, top + h])
+    else:
+        for i in indices(out.size):
+            out[i] = c * x[i] + m * y[i] + d * z[i]
+    fix_stored(out, ld, K.width, 0, fixed)
+
+
+# steps
 
 @source
 def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, points):
@@ -112,8 +289,13 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         elif state.mixed_steps[0] > 0:
             body_linearised(e.copies, flat_points(w.origins), flat_points(w.R), w.constitutive,
                             w.independent)
-            if matrices.dampers.viscous > 0:
-                _add_rates(e, method, s.h, w)
+            if matrices.dampers.viscous > 0:  # and by the rates of the correction R
+                for k in range(n):
+                    clear(scratch)
+                    for j in range(n):
+                        add_multiple(method.first[k, j] / s.h, w.R[j], scratch)
+                    add_viscous_stress(e.viscous, e.body, e.copies, k, w.origins[0], scratch,
+                                       w.stresses, w.independent)
     _states(e.free, method, s, w, step, True)
     if status != DONE and status != FAILED:
         state.failure[0] = NOT_CONVERGED
@@ -293,18 +475,6 @@ def _internal(e, matrices, method, s, w, state, step):
             body_force(e.body, w.U[k], w.R[k])
     else:
         body_force(e.copies, U, f)
-
-
-@source
-def _add_rates(e, method, h, w):
-    """Add the change of viscous stresses by the correction R to the independent stresses."""
-    dv = w.x[0]
-    for k in range(w.R.shape[0]):
-        clear(dv)
-        for j in range(w.R.shape[0]):
-            add_multiple(method.first[k, j] / h, w.R[j], dv)
-        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origins[0], dv, w.stresses,
-                           w.independent)
 
 
 @source

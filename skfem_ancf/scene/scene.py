@@ -21,7 +21,7 @@ from ..core import (Array, ArrayLike, ConvergenceError, InputError, Interrupted,
                     StrPath, ask, ask_field, refuse, require_finite, require_finite_scalar,
                     require_function, require_label, require_option, require_positive)
 from ..dynamics import Scheme, choose_scheme, get_scheme
-from ..dynamics.choice import RTOL
+from ..dynamics.schemes import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate, resume
 from ..dynamics.sensors import Sensor, locate

@@ -15,7 +15,7 @@ from ..beam import Beam
 from ..core import (AncfError, Array, ConvergenceError, InputError, Interrupted, ModelWarning,
                     NameUnknown, SupportError, gauss, refuse, require_finite, require_integer,
                     require_option, require_positive, warn)
-from ..dynamics.choice import choose_scheme
+from ..dynamics.schemes import choose_scheme
 from ..dynamics.integrator import OF_STEP
 from ..elements.base import DEGREES
 from ..equations.system import System
