@@ -331,6 +331,21 @@ def close_acceleration(e, matrices, rule, s, w, state):
     return GO_ON
 
 
+@apart("damping", *ALL)
+def add_work(e, matrices, rule, s, w, state):
+    """Add the work of damping at the mean velocity of the step."""
+    # In the conserving scheme this is the work of its force. In others the mean force of both ends
+    # could have negative work, because of unresolved vibrations.
+    u, u0, d, middle = w.x.u, w.y[0], w.x.damping, w.x.middle
+    damping_velocity = w.x.damping_velocity
+    for i in indices(u.size):
+        damping_velocity[i] = (u[i] - u0[i]) / s.dt
+        middle[i] = 0.5 * (u[i] + u0[i])
+    t = s.acting if rule.conserving > 0 else s.t - 0.5 * s.dt
+    damping_force(e, matrices.dampers, matrices.M, t, middle, damping_velocity, 0.0, d, w.x.scratch)
+    state.dissipated[0] += s.dt * dot(d, damping_velocity)
+
+
 @source
 def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _):
     """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded."""
@@ -347,16 +362,7 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
         if status == FAILED:
             return n
         if matrices.dampers.active > 0:
-            # Work of damping at the mean velocity of the step: in the conserving scheme that of its
-            # force. In others the mean force of both ends could have negative work, because of
-            # unresolved vibrations.
-            for i in indices(w0.size):
-                w.x.damping_velocity[i] = (w.x.u[i] - w.y[0, i]) / s.dt
-                w.x.middle[i] = 0.5 * (w.x.u[i] + w.y[0, i])
-            damping_force(e, matrices.dampers, matrices.M,
-                          s.acting if rule.conserving > 0 else s.t - 0.5 * s.dt, w.x.middle,
-                          w.x.damping_velocity, 0.0, w.x.damping, w.x.scratch)
-            state.dissipated[0] += s.dt * dot(w.x.damping, w.x.damping_velocity)
+            add_work(e, matrices, rule, s, w, state)
         if e.lasting > 0:
             settle(e, (s.acting, s.t), s.dt if rule.conserving > 0 else 0.0, w.y[0], w.x.u, w.x.v,
                    taken)

@@ -189,7 +189,7 @@ class LinearSolver:
 
     def keep_band(self) -> None:
         """Take the factors of the band for those of the whole."""
-        self._last.factors = Alone(self._system)
+        self._last.factors = Alone(self._system.K, self._system.symmetric)
 
     def forget(self) -> None:
         """Discard all factors."""
@@ -208,19 +208,18 @@ class LinearSolver:
 
 
 class Alone:
-    """The factors of a band matrix, of a system that may be more at another displacement."""
+    """The factors of a band matrix K, of a system that may be more at another displacement."""
 
-    def __init__(self, system: Any) -> None:
-        self._system = system
+    def __init__(self, K: BandMatrix, symmetric: bool) -> None:
+        self._K, self._symmetric = K, symmetric
 
     def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
         """Solve for a right-hand side b (n,); there are no multipliers."""
-        return self._system.K.solve(b), c
+        return self._K.solve(b), c
 
     def inertia(self) -> Inertia:
         """Inertia of the symmetric part of K."""
-        s = self._system
-        return (s.K if s.symmetric else s.K.symmetric_part()).inertia()
+        return (self._K if self._symmetric else self._K.symmetric_part()).inertia()
 
 
 class Schur:

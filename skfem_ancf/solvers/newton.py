@@ -213,6 +213,7 @@ class Search:
         yield "smaller load steps", partial(self.load_steps, "mixed", few)
         if self.stable and not early:
             yield "descent", self.descent
+            yield "load steps as small as may be", partial(self.load_steps, "mixed")
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
