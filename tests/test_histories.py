@@ -692,7 +692,7 @@ def test_what_cannot_be_is_said():
     for shares, times, text in (([0.6, 0.5], [1.0, 2.0], "below 1"), ([0.5], [-1.0], "times")):
         with pytest.raises(InputError, match=text):
             Prony(StVenantKirchhoff(E, NU), shares, times)
-    with pytest.raises(InputError, match="elastic one"):
+    with pytest.raises(InputError, match="must be elastic"):
         Prony(steel, [0.5], [1.0])
     with pytest.raises(InputError, match="number for E"):
         ElasticPlastic(lambda x, y: E, NU, YIELD)

@@ -94,7 +94,7 @@ def test_sets_of_abaqus_may_overlap(tmp_path):
         assert frame.nodes("loaded").tolist() == [1, 2, 3]
         tips.append(state.displacement(tuple(ARC[2])))
     assert_allclose(tips, [tips[0]] * len(tips), rtol=1e-8)
-    with pytest.raises(InputError, match="line . is in the groups .* groups= names those"):
+    with pytest.raises(InputError, match="line . is in the groups .* groups= names the sets"):
         Frame.from_meshio(path, groups=["left", "loaded"], **OPTIONS)
     with pytest.raises(NameUnknown, match="set of lines in groups 'rigth'.*did you mean 'right'"):
         Frame.from_meshio(path, groups=["rigth"], **OPTIONS)

@@ -327,7 +327,7 @@ def test_curves_of_sensors_are_drawn():
     line, = ax.get_lines()
     assert np.array_equal(line.get_ydata(), history.sensors["force"])
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("tip 1", "force")
-    with pytest.raises(InputError, match="a pair of its name and a component"):
+    with pytest.raises(InputError, match="its name and a component"):
         history.plot_curve("t", "tip")
     with pytest.raises(InputError, match="component"):
         history.plot_curve("t", ("tip", 5))

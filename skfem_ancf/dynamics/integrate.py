@@ -173,7 +173,7 @@ class Checkpoint:
                    "scene.resume({!r}) continues it; delete the file to start again",
                    str(self.path), there["now"]["t"], there["task"]["t_end"], str(self.path),
                    error=CheckpointError)
-        with retold(OSError, "the checkpoint {!r} cannot be written: {error}", str(self.path),
+        with retold(OSError, "the checkpoint '{}' cannot be written: {error}", str(self.path),
                     error=CheckpointError):
             self._write()
 
