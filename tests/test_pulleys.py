@@ -40,22 +40,22 @@ def turning(rate, ramp):
     return angle
 
 
-def motor(history, rate, ramp, scheme):
+def motor(history, rate, ramp, belt_turns, scheme):
     """The power of the pulley's motor at the last instant, and its work (nt,): the speed times
-    minus the moment of the belt. Energy-momentum has forces that are means of the steps, and act
-    where points are in the middle of a step."""
+    minus the moment of the belt. Energy-momentum has contact forces that are means of the steps,
+    and act where points are in the middle of a step."""
     speed = rate * np.clip((history.t - 1.0) / ramp, 0, 1)
-    moments, middles, before = [], [], None
-    for state in history:
-        r, (p, q) = state.contact().points, state.contact().force
-        moments.append(np.sum(r[1] * p - r[0] * q))  # minus that on the belt
-        x, y = r if before is None else 0.5 * (before + r)
-        middles.append(np.sum(y * p - x * q))
-        before = r
-    moments = np.array(moments)
-    mean = (np.array(middles[1:]) * 0.5 * (speed[1:] + speed[:-1]) if scheme == "energy-momentum"
-            else 0.5 * (moments[1:] * speed[1:] + moments[:-1] * speed[:-1]))
-    return moments[-1] * speed[-1], np.append(0.0, np.cumsum(np.diff(history.t) * mean))
+    mean_speed, dt = 0.5 * (speed[1:] + speed[:-1]), np.diff(history.t)
+    means = scheme == "energy-momentum"
+    back = np.append(0.0, 0.5 * dt * mean_speed if means and belt_turns else 0.0 * dt)
+    moments = []
+    for state, turn in zip(history, back):
+        (x, y), (p, q) = state.contact().points, state.contact().force
+        x, y = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
+        moments.append(np.sum(y * p - x * q))  # minus that on the belt
+    power = np.array(moments) * speed
+    work = moments[1:] * mean_speed if means else 0.5 * (power[1:] + power[:-1])
+    return power[-1], np.append(0.0, np.cumsum(dt * work))
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -69,7 +69,7 @@ def test_a_driven_pulley_slips_under_a_belt_that_is_held(scheme):
     pull = SPRING * last.displacement(LEFT)[1]
     assert pull == pytest.approx(WEIGHT * np.exp(FRICTION * np.pi), rel=1e-2)
     assert np.abs(last.velocity((0, AXIS))).max() < 0.03 * rate * RADIUS  # the belt is at rest
-    power, work = motor(history, rate, ramp, scheme)
+    power, work = motor(history, rate, ramp, False, scheme)
     assert power == pytest.approx((pull - WEIGHT) * AXIS * rate, rel=1e-2)
     lost = np.polyfit(history.t[-25:], history.dissipated[-25:], 1)[0]
     assert lost == pytest.approx(power, rel=1e-2)
@@ -89,7 +89,7 @@ def test_a_belt_that_sticks_goes_with_the_rim(scheme):
     for phi in (0.25 * np.pi, 0.5 * np.pi, 0.75 * np.pi):
         v = last.velocity((-AXIS * np.cos(phi), AXIS * np.sin(phi)))
         assert np.hypot(*v) == pytest.approx(rate * AXIS, rel=1e-2)
-    power, work = motor(history, rate, ramp, scheme)
+    power, work = motor(history, rate, ramp, True, scheme)
     length = 2 * TAIL + np.pi * AXIS
     drag = loss * DENSITY * HEIGHT * WIDTH * length * rate * AXIS
     assert power == pytest.approx(((ratio - 1) * WEIGHT + drag) * AXIS * rate, rel=2e-2)
