@@ -33,21 +33,22 @@ def test_the_rule(place, facets):
 
 
 @pytest.mark.parametrize("place, error, message", [
-    ((1, 1), MeshError, r"the point \(1, 1\) is on no section .* node 2 with its axis at \(1, 0\)"),
-    ((0.9, 0), MeshError, r"nearest is that of node 2 with its axis at \(1, 0\), 0.1 away"),
+    ((1, 1), MeshError, r"the point \(1, 1\) is on no section .* node 2 at \(1, 0\)"),
+    ((0.9, 0), MeshError, r"nearest is that of node 2 at \(1, 0\), 0.1 away"),
     ((1, 0.06), MeshError, "0.01 away"),
     (lambda x: x[0] > 99, MeshError,
      r"selects none of the 13 facets.* \(0, -0.05\) to \(2, 0.05\)"),
-    (lambda x: 3, InputError, "returns n truth values, as lambda"),
-    (lambda x: x[0], InputError, "returned float64"),
+    (lambda x: 3, InputError, "returns n truth values .*, as lambda"),
+    (lambda x: x[0], InputError, "returned array"),
     (lambda x: x[7] > 0, InputError, "of x of shape .* raised IndexError"),
     ("lefft", NameUnknown, "'left', 'right'"),
     ("empty", MeshError, "'empty' is empty.*'left'"),
     (1, InputError, r"np.array\(\[1\]\)"), ([1, 2, 3], InputError, r"np.array\(\[1, 2, 3\]\)"),
     (3.5, InputError, "a place is"), ([], InputError, "a place is"), (None, InputError, "a place"),
     (True, InputError, "a place is"), ((1, "a"), InputError, "a place is"),
-    (np.array([99]), MeshError, "numbered 0 to 12, got 99: 0 to 4 are the sections"),
-    (np.array([-1]), MeshError, "got -1"), (np.array([], dtype=int), InputError, "not empty"),
+    (np.array([99]), MeshError, "numbered 0 to 12, got 99"),
+    (np.array([-1]), MeshError, "got -1"),
+    (np.array([], dtype=int), InputError, "a place is .*, got array"),
     (np.array([True, False]), InputError, "array of integers"),
     (np.array([1.0, 2.0, 3.0]), InputError, "array of integers"),
     ((np.nan, 0), InputError, "NaN"),
@@ -77,7 +78,7 @@ def test_a_point_is_where_it_says():
                               np.linspace(0, 2 * np.pi, 9), 0.1)
     assert_array_equal(facets_of(arc, (0, 1)), [2])
     assert_array_equal(facets_of(arc, (0, 1.03)), [2])
-    with pytest.raises(MeshError, match=r"sections of the nodes \[0, 8\] at once"):
+    with pytest.raises(MeshError, match=r"sections of the nodes \[0, 8\]: give np.array"):
         facets_of(arc, (1, 0))
     with pytest.raises(InputError, match=r"pin fixes the axis, at \(0, 1\)"):
         Scene(beam(arc)).pin((0, 1.03))

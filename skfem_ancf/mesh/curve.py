@@ -40,16 +40,16 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
                     error=MeshError):
             points = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None,
                                 ndmin=2, quotechar='"')
-        refuse(points.shape[1] != 2, "{} must hold rows of two numbers, x and y; it has {} columns",
-               path, points.shape[1], error=MeshError)
+        refuse(points.shape[1] != 2, "{} has {} columns in place of x and y", path, points.shape[1],
+               error=MeshError)
     x = require_finite("points", points, (None, 2))
     noise, n = require_finite_scalar("noise", noise), len(x)
     refuse(n < 2, "an axis needs at least two points, got {}", n, error=MeshError)
     refuse(noise < 0, "noise must not be negative, got {!r}", noise, error=MeshError)
     steps = np.hypot(*np.diff(x, axis=0).T)
     # the spline would turn between points so close
-    refuse_any(steps <= CLOSE * np.max(steps), "the points {k} and {} are both at {}: leave one "
-               "out", np.arange(1, n), x[:-1].T, error=MeshError)
+    refuse_any(steps <= CLOSE * np.max(steps), "the points {k} and {} are both at {}",
+               np.arange(1, n), x[:-1].T, error=MeshError)
     s = np.append(0.0, np.cumsum(steps))
     (t, c, k), _ = splprep(x.T, u=s, s=n * noise**2, k=min(3, n - 1))
     curve = BSpline(t, np.array(c), k, axis=1)
@@ -84,9 +84,8 @@ def _on_curve(what, function, s):
     try:
         return ask_array(what, (2, len(s)), lambda s: _components(function(s), s), s)
     except CallbackError as error:
-        raise CallbackError(f"{error}; the function takes parameters of shape (n,) and returns "
-                            "positions of shape (2, n): a component that is constant is 0 * s + 1"
-                            ) from error.__cause__
+        raise CallbackError(f"{error}; for s (n,) it returns positions (2, n), a constant as 0 * s "
+                            "+ 1") from error.__cause__
 
 
 class Curve:
@@ -107,8 +106,8 @@ class Curve:
         """The derivative at parameters s, checked to be nonzero."""
         d = self.rate(s)
         size = np.hypot(*d)
-        refuse_any(size <= 1e-12 * size.max(initial=0.0), "the curve has no tangent: its "
-                   "derivative is zero at s = {:.9g}", s, error=MeshError)
+        refuse_any(size <= 1e-12 * size.max(initial=0.0), "the derivative of the curve is zero at "
+                   "s = {:.9g}", s, error=MeshError)
         return d
 
     def nodes(self, s: Array) -> tuple[Array, Array]:
@@ -140,9 +139,8 @@ class Curve:
         here, d_gauss, d_fine = _each(self._moving, s, gauss, fine)
         lengths = np.hypot(*d_gauss) @ w * step
         gap = np.hypot(*(d_gauss @ w * step - np.diff(p))) / lengths
-        refuse_any(~(gap <= 0.02), "r jumps, or its derivative does not fit, between s = {:.9g} "
-                   "and {:.9g}: the integral of the derivative misses r by {:.6g}", a, s[1:],
-                   gap * lengths, error=MeshError)
+        refuse_any(~(gap <= 0.02), "r jumps, or its derivative misses it by {:.6g}, between s = "
+                   "{:.9g} and {:.9g}", gap * lengths, a, s[1:], error=MeshError)
         if len(s) > 2:
             chords = (p_beside - p[:, None, 1:-1]) * np.sign(ASIDE)[:, None]
             wide, narrow = _angles(chords[:, 0], chords[:, 1]), _angles(chords[:, 2], chords[:, 3])
@@ -150,9 +148,9 @@ class Curve:
             chord = np.hypot(*chords[:, 2:]).min(axis=0)
             seen = chord * KINK > 32.0 * np.finfo(float).eps * np.abs(p[:, 1:-1]).max()
             kink = np.where(seen & (np.abs(narrow) > 0.7 * np.abs(wide)), np.abs(narrow), 0.0)
-            refuse_any(kink > KINK, 'the curve has a kink of {:.3g} degrees at s = {:.9g}: give '
-                       'one beam for each smooth part, and weld them in a scene with '
-                       'scene.joint("weld", ...)', np.rad2deg(narrow), s[1:-1], error=MeshError)
+            refuse_any(kink > KINK, "the curve has a kink of {:.3g} degrees at s = {:.9g}: weld "
+                       "one beam for each smooth part", np.rad2deg(narrow), s[1:-1],
+                       error=MeshError)
         v = np.hypot(*d_fine)
         pieces = (v[:-2:2] + 4.0 * v[1::2] + v[2::2]) * np.repeat(step / 96.0, 16)  # Simpson's rule
         bent = np.abs(_angles(d_fine[:, :-2:2], d_fine[:, 2::2])) / pieces

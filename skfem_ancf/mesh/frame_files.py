@@ -49,9 +49,9 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
                 lines.append(entity.dxf.layer)
             elif kind == "POINT":
                 points.append((entity.dxf.layer, part.dxf.location.xyz))
-            refuse(kind in CURVES, "{} has {} in the layer {!r}, no straight line: explode blocks, "
-                   "draw curves as polylines", path, kind, entity.dxf.layer, error=MeshError)
-    refuse(not lines, "{} has no lines and no polylines in its model space", path, error=MeshError)
+            refuse(kind in CURVES, "{} has {} in the layer {!r}: explode blocks, draw curves as "
+                   "polylines", path, kind, entity.dxf.layer, error=MeshError)
+    refuse(not lines, "{} has no lines and no polylines", path, error=MeshError)
     at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
     at = at * _scale(drawing.units, unit, path)
     ends, alone = np.split(number.ravel(), [2 * len(lines)])
@@ -71,8 +71,8 @@ def _scale(code, unit, path):
                     f"in {stated}" if stated else "in a unit that it does not state")
         return 1.0
     target = getattr(units, require_option("unit of length", unit, UNITS).upper())
-    refuse(stated is None, "{} does not state its unit ($INSUNITS is {}), so that it cannot be "
-           "converted to {!r}: leave out unit=, and scale the drawing", path, code, unit)
+    refuse(stated is None, "{} does not state its unit ($INSUNITS is {}): leave out unit={!r}",
+           path, code, unit)
     return units.conversion_factor(code, target)
 
 
@@ -85,14 +85,13 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     """The graph of the line cells of a ``meshio.Mesh``, or of a file of meshio or DXF: see
     :meth:`skfem_ancf.Frame.from_meshio`. ``named`` are sets to which other arguments refer."""
     mesh = _mesh_of(mesh, unit)
-    refuse(groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)),
-           "groups are names of sets of lines, got {!r}", groups)
+    refuse(not isinstance(groups, (str, list, tuple, set, frozenset, type(None))), "groups are "
+           "names of sets of lines, got {!r}", groups)
     points = require_finite("the points of the mesh", mesh.points)
     kinds = {block.type for block in mesh.cells}
     odd = sorted(kind for kind in kinds if kind != "vertex" and not LINE.fullmatch(kind))
-    refuse(odd, "the mesh has cells of the kinds {}, which are no lines: a frame is made of "
-           "'line', 'line3', 'line4', ..., and 'vertex' names nodes; leave the others out of the "
-           "mesh", odd, error=MeshError)
+    refuse(odd, "the mesh has cells of the kinds {}: a frame is made of 'line', 'line3', ..., and "
+           "'vertex' names nodes", odd, error=MeshError)
     blocks = {k: block for k, block in enumerate(mesh.cells) if LINE.fullmatch(block.type)}
     cells = [_ends_first(points, cell) for block in blocks.values()
              for cell in np.asarray(block.data, dtype=np.int64)]
@@ -108,7 +107,7 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
         inside = np.unique(np.concatenate(lines))
         x, y, z = points[inside].T
         refuse_any(np.abs(z) > 1e-6 * max(np.ptp(x), np.ptp(y)), "the point {} of the mesh is at z "
-                   "= {:.9g}: a frame lies in the plane z = 0", inside, z, error=MeshError)
+                   "= {:.9g} in place of 0", inside, z, error=MeshError)
     curves = {k: partial(_polynomial, points[cell, :2].T) for k, cell in enumerate(lines)
               if len(cell) > 2}
     first = dict(zip(blocks, np.cumsum([0] + [len(b.data) for b in blocks.values()])))
@@ -138,8 +137,7 @@ def _mesh_of(mesh, unit):
             mesh = meshio.read(path)
         if path.suffix.lower() == ".inp":
             _require_sets_of_abaqus(path)
-    refuse(unit is not None, "unit={!r} is for drawings in DXF, which state theirs: other meshes "
-           "are taken as they are", unit)
+    refuse(unit is not None, "unit={!r} is for drawings in DXF, which state theirs", unit)
     return require_kind("mesh", mesh, meshio.Mesh, " of meshio or the name of a file")
 
 
@@ -156,15 +154,13 @@ def _require_sets_of_abaqus(path):
             elif keyword == "*ELSET":
                 sets.append(name)
         elif keyword == "*ELSET":
-            refuse(re.match(r"\s*[A-Za-z_]", line), "{}: the set {!r} lists names of sets, which "
-                   "are not read: list numbers of elements", path, sets[-1], error=MeshError)
+            refuse(re.match(r"\s*[A-Za-z_]", line), "{}: the set {!r} lists names of sets: list "
+                   "numbers of elements", path, sets[-1], error=MeshError)
     named = [name for name in blocks if name]
     again = sorted({name for name in named + sets if (named + sets).count(name) > 1})
-    refuse(again or blocks[:len(named)] != named, "{}: element sets are read if each has one "
-           "place, at *ELSET or at an *ELEMENT, ELSET=... before which others have names, too: {}; "
-           "write *ELSET with the numbers of all its elements", path,
-           f"{again[0]!r} is there twice" if again else "a block has none before one that has",
-           error=MeshError)
+    refuse(again or blocks[:len(named)] != named, "{}: write *ELSET with the numbers of all its "
+           "elements: {}", path, f"{again[0]!r} is there twice" if again else
+           "an *ELEMENT has no set before one that has", error=MeshError)
 
 
 def _ends_first(points, cell):
@@ -174,9 +170,8 @@ def _ends_first(points, cell):
     a, b, c = points[cell]
     if np.linalg.norm(c - a) > max(np.linalg.norm(b - a), np.linalg.norm(c - b)):
         return cell[[0, 2, 1]]
-    refuse(np.linalg.norm(c - b) > np.linalg.norm(b - a), "the line through the points {} of the "
-           "mesh does not have its middle between its ends: the order is end, end, middle, or in "
-           "files of Abaqus end, middle, end", cell.tolist(), error=MeshError)
+    refuse(np.linalg.norm(c - b) > np.linalg.norm(b - a), "the points {} of a line are not in the "
+           "order end, end, middle, or end, middle, end", cell.tolist(), error=MeshError)
     return cell
 
 
@@ -186,8 +181,8 @@ def _names(mesh, blocks, used, wanted):
             if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
     groups, found = {}, dict[str, list[Any]]()
     for name, parts in sets.items():
-        refuse(len(parts) > len(mesh.cells), "the cell set {!r} has {} parts, the mesh {} blocks "
-               "of cells: name cells, not sets", name, len(parts), len(mesh.cells), error=MeshError)
+        refuse(len(parts) > len(mesh.cells), "the cell set {!r} has {} parts, the mesh {} blocks",
+               name, len(parts), len(mesh.cells), error=MeshError)
         parts = {k: _entries(name, part, len(mesh.cells[k].data)) for k, part in enumerate(parts)
                  if part is not None}
         some = [blocks[k][part] for k, part in parts.items() if k in blocks and len(part)]

@@ -164,22 +164,21 @@ class FrameGraph:
         a, b = self.lines
         refuse_any((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n), "line {k} joins the points "
                    "{}, which are numbered 0 to {}", self.lines, n - 1, error=MeshError)
-        refuse_any(a == b, "line {k} has no length: it joins the point {} to itself", a,
-                   error=MeshError)
-        refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line: "
-                   "remove it, or join it to another point", self.points, error=MeshError)
+        refuse_any(a == b, "line {k} joins the point {} to itself", a, error=MeshError)
+        refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line",
+                   self.points, error=MeshError)
         self._merge(tol)
         self._require_lines()
         self.beams = tuple(self.groups) if beams is None else tuple(beams)
         taken = np.full(m, -1)  # the number of the group of each line
         for name in self.beams:
             some = self.groups[name]
-            refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: a group is a "
-                       "beam, so a line is in one at most; groups= names the sets of a mesh that "
-                       "are beams", some, np.array(self.beams)[taken[some]], name)
+            refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: groups= names "
+                       "the sets of a mesh that are beams", some,
+                       np.array(self.beams)[taken[some]], name)
             taken[some] = self.beams.index(name)
             refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
-                   "shorter than tol = {:.3g}, and vanish", name, self.tol, error=MeshError)
+                   "shorter than tol = {:.3g}", name, self.tol, error=MeshError)
 
     def _require_lines(self):
         key = np.sort(self.lines[:, self.distinct], axis=0)
@@ -188,8 +187,7 @@ class FrameGraph:
         for i, j in zip(self.distinct[first], self.distinct):
             if i != j and not {int(i), int(j)} & set(self.curves):
                 raise MeshError(f"lines {i} and {j} are the same: both join the points "
-                                f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
-                                "them a curve")
+                                f"{np.sort(self.lines[:, j]).tolist()}")
         # warn of nodes on a straight line between its ends: lines are joined at their
         # ends only
         some = np.setdiff1d(self.distinct, list(self.curves))
@@ -223,9 +221,8 @@ class FrameGraph:
         one = (apart <= self.tol * (1.0 + 1e-9)) & (self.tol > 0.0)
         for (i, j), d in zip(pairs[~one], apart[~one]):
             if d <= NEAR * self.size:
-                raise MeshError(f"the points {i} and {j} are both at {_at(places[:, i])}: lines "
-                                "that end there would not be joined; let them end at one point, "
-                                "with hinges where they may turn, or give tol= to make them one")
+                raise MeshError(f"the points {i} and {j} are both at {_at(places[:, i])}: give "
+                                "tol= to make them one")
         joined = sparse.coo_array((np.ones(int(one.sum())), pairs[one].T), (n, n))
         _, label = connected_components(joined, directed=False)
         _, first = np.unique(label, return_index=True)
@@ -234,13 +231,13 @@ class FrameGraph:
         self.distinct = np.flatnonzero(self.lines[0] != self.lines[1])
         # move the ends of curves to merged nodes
         for k, curve in self.curves.items():
-            refuse(k not in self.distinct, "the ends of line {}, a curve, are one node within tol "
-                   "= {:.3g}: give a smaller tol=", k, self.tol, error=MeshError)
+            refuse(k not in self.distinct, "the ends of line {}, a curve, are one node: give "
+                   "tol= below {:.3g}", k, self.tol, error=MeshError)
             shift = (self.points - places)[:, self.given[:, k]]
             if np.any(shift):
                 self.curves[k] = partial(_moved, curve, shift)
-        refuse(not len(self.distinct), "all lines are shorter than tol = {:.3g}, within which "
-               "points are one node", self.tol, error=MeshError)
+        refuse(not len(self.distinct), "all lines are shorter than tol = {:.3g}", self.tol,
+               error=MeshError)
         if tol is None:
             _warn_of(pairs[one], apart[one], f"are one node, as they are not farther apart than "
                      f"tol = {self.tol:.3g}: give tol= for another distance, tol=0 to keep them "
@@ -266,8 +263,7 @@ class FrameGraph:
         place = points_of_rows(place)
         if isinstance(place, str):
             refuse(place in self.lost, "{!r} contains the point {} of the mesh, which is not an "
-                   "end of a line: a frame is supported and loaded at ends of lines", place,
-                   self.lost.get(place), error=MeshError)
+                   "end of a line", place, self.lost.get(place), error=MeshError)
             require_option("name of nodes", place, {**self.nodes, **self.groups})
             if place in self.nodes:
                 return self.nodes[place]
@@ -276,8 +272,8 @@ class FrameGraph:
             x = require_finite("the point", place, (2,))
             off = np.hypot(*(self.points - x[:, None]))
             k = int(np.argmin(off))
-            refuse(off[k] > 1e3 * NEAR * self.size, "no node of the frame is at {:.9g}: the "
-                   "nearest is number {} at {:.9g}", x, k, self.points[:, k], error=MeshError)
+            refuse(off[k] > 1e3 * NEAR * self.size, "no node is at {:.9g}: the nearest is number "
+                   "{} at {:.9g}", x, k, self.points[:, k], error=MeshError)
             return np.array([k])
         if callable(place):
             chosen = satisfying(place, self.points, "nodes")
@@ -319,8 +315,8 @@ class FrameGraph:
                               lambda s, curve=curve: curve(s[0]),  # type: ignore[misc]
                               np.array([[0.0, 1.0]] * 2))
             refuse(np.max(np.abs(found - x)) > 1e3 * NEAR * self.size, "the curve of line {} runs "
-                   "from {:.9g} to {:.9g}, its points are at {:.9g} and {:.9g}: a curve is a "
-                   "function of s from 0 to 1", number, *found.T, *x.T, error=MeshError)
+                   "from {:.9g} to {:.9g} for s from 0 to 1, its points are at {:.9g} and {:.9g}",
+                   number, *found.T, *x.T, error=MeshError)
             arc = MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, int(n[k]) + 1),
                                       height[k] if isinstance(height, list) else height)
             p[:, nodes], tangent[:, nodes], turning[:, nodes] = arc.p, arc.p_X, arc.p_XY
@@ -343,9 +339,9 @@ def _pairs(what, values):
     """Pairs in rows, as an array (2, n)."""
     rows = hasattr(values, "__iter__") and not isinstance(values, (np.ndarray, str, Mapping))
     found = require_finite(what, list(values) if rows else values)
-    refuse(found.ndim != 2 or found.shape[1] != 2 or not len(found), "{} are pairs, one at least: "
-           "a list of pairs or an array of shape (n, 2), got {!r} of shape {}{}", what, values,
-           found.shape, "; give its transpose" * (found.ndim == 2 and len(found) == 2))
+    refuse(found.ndim != 2 or found.shape[1] != 2 or not len(found), "{} are pairs, shape (n, 2), "
+           "got {!r} of shape {}{}", what, values, found.shape,
+           "; give its transpose" * (found.ndim == 2 and len(found) == 2))
     return found.T
 
 

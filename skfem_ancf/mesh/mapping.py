@@ -35,20 +35,18 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
     """Largest height, heights (4, ne) in the elements, and the function; None for a number."""
     if not callable(height):
         refuse(isinstance(height, (list, tuple)) or getattr(height, "ndim", 0) > 0, "height is a "
-               "number, or a function of parameters (n,), got {!r}: for heights at nodes, "
-               "height=lambda x: np.interp(x, nodes, heights)", height)
+               "number or a function, as lambda x: np.interp(x, nodes, heights), got {!r}", height)
         return require_positive("height", height), None, None
     a, b = s[t]
     at = a + np.append(PLACES, BETWEEN)[:, None] * (b - a)
     found = ask_array("height(x)", (at.size,), height, at.ravel(), number=True)
     found = found.reshape(at.shape)
-    refuse_any(found.ravel() <= 0.0, "the height of a beam is positive, got {:.6g} at {:.6g}: end "
-               "the mesh before it gets thin there", found.ravel(), at.ravel(), error=MeshError)
+    refuse_any(found.ravel() <= 0.0, "the height of a beam is positive, got {:.6g} at {:.6g}",
+               found.ravel(), at.ravel(), error=MeshError)
     heights, between = found[:4].copy(), found[4:]
     gap = np.max(np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between, axis=0)
-    refuse_any(gap > FITS, "the height is not smooth in element {k}, from {:.6g} to {:.6g}: a "
-               "cubic polynomial differs by {:.1%}. Put a node at a kink, weld two beams at a "
-               "jump, or use more elements", a, b, gap, error=MeshError)
+    refuse_any(gap > FITS, "the height in element {k}, from {:.6g} to {:.6g}, differs from a cubic "
+               "by {:.1%}: use more elements, with a node at a kink", a, b, gap, error=MeshError)
     return float(np.max(heights)), heights, height
 
 
@@ -294,11 +292,10 @@ class MappingBeam(Mapping):
         m = self.mesh
         if m.heights is not None:
             thin = np.min(self._relative(_FACES[0], None)[0], axis=1) <= THIN
-            refuse_any(thin, "the height is zero to round-off in element {k}, which starts at {}: "
-                       "end the mesh before it gets thin there", m.p[:, m.t[0]], error=MeshError)
+            refuse_any(thin, "the height is zero to round-off in element {k}, which starts at {}",
+                       m.p[:, m.t[0]], error=MeshError)
         least = m.lengths * m.height if m.is_straight and m.heights is None else (
             self.detDF(_FACES).min(axis=1))
-        refuse_any(~(least > 0.0), "the body folds in element {k}, which starts at {:.6g}: the "
-                   "radius of curvature is below half the height {:.6g}, or the elements are too "
-                   "long for the curve; use a smaller height, a gentler curve or more elements",
-                   m.p[:, m.t[0]], m.height, error=MeshError)
+        refuse_any(~(least > 0.0), "the body folds in element {k}, which starts at {:.6g}: use a "
+                   "height below {:.6g} or more elements", m.p[:, m.t[0]], m.height,
+                   error=MeshError)

@@ -134,9 +134,7 @@ class MeshBeam(NumberedMesh):
         x = require_finite("x", x, (None,), "np.linspace(0, length, elements + 1)")
         origin = require_finite("origin", origin, (2,))
         angle = _radians(angle)
-        refuse(len(x) < 2, "a beam needs at least two nodes, got {}", len(x), error=MeshError)
-        refuse_any(x[1:] <= x[:-1], "element {k} from x = {:.9g} to {:.9g} has no positive length; "
-                   "the nodes must increase along the axis", x[:-1], x[1:], error=MeshError)
+        _require_nodes("x", x)
         e1 = np.array([np.cos(angle), np.sin(angle)])
         p = origin[:, None] + e1[:, None] * x
         t = _chain(len(x))
@@ -175,9 +173,7 @@ class MeshBeam(NumberedMesh):
         True
         """
         s = require_finite("s", s, (None,))
-        refuse(len(s) < 2, "a beam needs at least two nodes, got {}", len(s), error=MeshError)
-        refuse_any(s[1:] <= s[:-1], "the parameters of the nodes must increase: s[{k}] = {:.9g}, "
-                   "then {:.9g}", s[:-1], s[1:], error=MeshError)
+        _require_nodes("s", s)
         what = "of parameters (n,) that returns positions (2, n)"
         require_function("r", r, what)
         if dr is None:
@@ -189,8 +185,8 @@ class MeshBeam(NumberedMesh):
         # the curvature of each sixteenth of an element times half the height there
         h = (largest + 0.0 * lengths if heights is None else np.max(heights, axis=0)).repeat(16)
         k = int(np.argmax(bent * h))
-        refuse(bent[k] * h[k] >= 2.0, "the curve folds near s = {:.6g}: its radius of curvature "
-               "{:.6g} is below half the height {:.6g}; use a smaller height or a gentler curve",
+        refuse(bent[k] * h[k] >= 2.0, "the curve folds near s = {:.6g}: its radius of curvature, "
+               "{:.6g}, is below half the height, {:.6g}",
                np.interp(k / 16.0, np.arange(len(s)), s), 1.0 / (bent[k] or np.inf), h[k] / 2,
                error=MeshError)
         return cls._from_nodes(p, t, tangent, lengths, (largest, heights, taper), s.copy(), curve,
@@ -270,29 +266,25 @@ class MeshBeam(NumberedMesh):
         require_moderate("the nodes", p)
         if type(self.t) is not np.ndarray or self.t.dtype != np.int32:
             t = require_finite("t", self.t)
-            refuse(np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1),
-                   "t must contain node numbers, got {!r}", self.t, error=MeshError)
+            refuse((t != np.floor(t)).any() or (abs(t) > 2**31 - 1).any(), "t must contain node "
+                   "numbers, got {!r}", self.t, error=MeshError)
         shape = np.shape(self.t)
-        refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "a MeshBeam has two nodes per "
-               "element and at least one element, t has shape {}; for quads use mesh.to_meshquad()",
-               shape, error=MeshError)
+        refuse(len(shape) != 2 or shape[0] != 2 or shape[1] == 0, "t of a MeshBeam has shape "
+               "(2, n), got {}; for quads use mesh.to_meshquad()", shape, error=MeshError)
         super().__post_init__()
         # Basis.refinterp makes meshes without a height
-        refuse(self.height is None, "height must be a number, got None: build meshes of beams with "
-               "MeshBeam.init_line or init_curve. For a picture of a Basis take quad = "
-               "mesh.to_meshquad() and quad.plot(basis.probes(quad.p) @ y), not basis.plot or "
-               "basis.refinterp", error=MeshError)
+        refuse(self.height is None, "height must be a number, got None: use MeshBeam.init_line; "
+               "for a picture of a Basis quad = mesh.to_meshquad() and "
+               "quad.plot(basis.probes(quad.p) @ y), not basis.plot", error=MeshError)
         self.height = require_positive("height", self.height)
         t = self.t
-        refuse((t[1] != t[0] + 1).any() or (t[0, 1:] <= t[0, :-1]).any(), "the nodes of a MeshBeam "
-               "are numbered along its axis: element k joins t[0, k] and t[0, k] + 1, and t[0] "
-               "increases", error=MeshError)
+        refuse((t[1] != t[0] + 1).any() or (t[0, 1:] <= t[0, :-1]).any(), "nodes are numbered "
+               "along the axis: t[0] increases, and t[1] = t[0] + 1", error=MeshError)
         odd = np.setxor1d(t, np.arange(p.shape[1]))
-        refuse_any(odd >= odd[:1], "every node of a MeshBeam is part of an element: there are {} "
-                   "nodes, and node {} is only in {}", p.shape[1], odd,
-                   np.where(np.isin(odd, t), "t", "the nodes"), error=MeshError)
-        refuse(self.p_X is None, "a MeshBeam needs the tangents p_X of its axis, and more: build "
-               "it with MeshBeam.init_line or init_curve", error=MeshError)
+        refuse_any(odd >= odd[:1], "node {} of {} is only in {}: every node is part of an element",
+                   odd, p.shape[1], np.where(np.isin(odd, t), "t", "the nodes"), error=MeshError)
+        refuse(self.p_X is None, "p_X is missing: use MeshBeam.init_line or init_curve",
+               error=MeshError)
         for name, wanted in (("p_X", p.shape), ("p_Y", p.shape), ("p_XY", p.shape),
                              ("lengths", shape[1:]), ("heights", (4, shape[1]))):
             value = getattr(self, name)
@@ -300,20 +292,19 @@ class MeshBeam(NumberedMesh):
                 found = require_finite(name, value, wanted)
                 if found is not value:
                     setattr(self, name, found)
-        refuse(self.heights is not None and np.any(self.heights <= 0.0),
-               "heights must be positive, got {!r}", self.heights, error=MeshError)
+        refuse(self.heights is not None and np.any(self.heights <= 0.0), "heights must be "
+               "positive, got {!r}", self.heights, error=MeshError)
         require_option("interpolation of the sections", self.sections, SECTIONS)
-        refuse(self.p_XY is None and self.sections != "linear", "the mesh has no derivative p_XY "
-               "of its directors: build it with MeshBeam.init_line or init_curve", error=MeshError)
+        refuse(self.p_XY is None and self.sections != "linear", "p_XY is missing: use "
+               "MeshBeam.init_line or init_curve", error=MeshError)
         self._check()
 
     def _check(self):
         """Raise MeshError where an element has no length, or the body folds."""
         p, t = self.doflocs, self.t
         chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
-        refuse_any((chord <= 4 * EPS * np.abs(p).max()) | (self.lengths <= 0.0), "element {k} has "
-                   "no length: its nodes are at {} and {}", *p[:, t].swapaxes(0, 1),
-                   error=MeshError)
+        refuse_any((chord <= 4 * EPS * np.abs(p).max()) | (self.lengths <= 0.0), "element {k} from "
+                   "{} to {} has no length", *p[:, t].swapaxes(0, 1), error=MeshError)
         MappingBeam(self).check()  # before its arrays are copied: not the mapping that is kept
 
     def with_sections(self, sections: str) -> MeshBeam:
@@ -489,8 +480,8 @@ class MeshBeam(NumberedMesh):
         """
         size = 0.25 * self.height if size is None else require_positive("size", size)
         growth = require_positive("growth", growth)
-        refuse(3.0 * self.height / size > MAX_ELEMENTS, "size = {:g} would make more than {} "
-               "elements of height {:g}: give a larger one", size, MAX_ELEMENTS, self.height)
+        refuse(3.0 * self.height / size > MAX_ELEMENTS, "size = {:g} is too small for a height of "
+               "{:g}", size, self.height)
         at = points_of_rows(at)
         if isinstance(at, str) or is_point(at) or not isinstance(at, (tuple, list, set, frozenset)):
             at = [at]
@@ -521,8 +512,7 @@ class MeshBeam(NumberedMesh):
         """
         require_unmasked("elements", elements)
         elements = np.unique(self.normalize_elements(elements))
-        refuse(not len(elements), "a mesh needs at least one element: the given set is empty",
-               error=MeshError)
+        refuse(not len(elements), "a mesh needs at least one element, got none", error=MeshError)
         nodes = np.unique(self.t[:, elements])
         renumber = np.full(self.p.shape[1], -1, dtype=np.int32)
         renumber[nodes] = np.arange(len(nodes))
@@ -579,8 +569,8 @@ class MeshBeam(NumberedMesh):
     def scaled(self, factors: ArrayLike) -> MeshBeam:
         """The mesh and its height scaled by a positive number, or several equal ones (n,)."""
         f = np.unique(require_finite("factors", factors))
-        refuse(len(f) != 1 or f[0] <= 0, "a beam is scaled by one positive factor in all "
-               "directions, got {!r}: sections would tilt otherwise", factors, error=MeshError)
+        refuse(len(f) != 1 or f[0] <= 0, "a beam is scaled by one positive factor, got {!r}",
+               factors, error=MeshError)
         return self._moved(np.eye(2), np.zeros(2), f[0])
 
     # pictures and files
@@ -688,8 +678,8 @@ class MeshBeam(NumberedMesh):
             return self.save_npz(path)
         import meshio
 
-        refuse(not path.suffix, "the file name {!r} has no suffix: end it with .npz, .vtu or "
-               "another format of meshio", str(path), error=FileError)
+        refuse(not path.suffix, "the file name {!r} has no suffix, as .npz or .vtu", str(path),
+               error=FileError)
         kinds = OSError, meshio.ReadError, meshio.WriteError, SystemExit
         with retold(kinds, "cannot write {!r}: {error}", str(path), error=FileError), (
                 contextlib.nullcontext(path) if path.suffix in IN_PARTS else archive.replacing(path)
@@ -709,8 +699,7 @@ class MeshBeam(NumberedMesh):
         require_options("load", kwargs, ("filename",))
         if path.suffix == ".npz":
             return cls.load_npz(path)
-        raise MeshError(f"cannot read a beam from {path.name!r}: only .npz files store the axis, "
-                        "the tangents and the height; save the mesh as one of them")
+        raise MeshError(f"cannot read a beam from {path.name!r}: give a .npz file of mesh.save()")
 
 
 def reach(meshes: Sequence[MeshBeam]) -> float:
@@ -735,9 +724,21 @@ def _chain(n):
     return np.array([nodes[:-1], nodes[1:]])
 
 
+def _require_nodes(name, x):
+    refuse(len(x) < 2, "a beam needs at least two nodes, got {}", len(x), error=MeshError)
+    refuse_any(x[1:] <= x[:-1], "{} must increase along the axis: element {k} from {:.9g} to "
+               "{:.9g} has no length", name, x[:-1], x[1:], error=MeshError)
+
+
+def _require_nodes(name, x):
+    refuse(len(x) < 2, "a beam needs at least two nodes, got {}", len(x), error=MeshError)
+    refuse_any(x[1:] <= x[:-1], "{} must increase along the axis: element {k} from {:.9g} to "
+               "{:.9g} has no length", name, x[:-1], x[1:], error=MeshError)
+
+
 def _radians(angle):
     """An angle as a float; InputError if it is likely to be in degrees."""
     angle = require_finite_scalar("angle", angle)
-    refuse(abs(angle) > 2.0 * np.pi * (1 + 1e-12), "an angle is given in radians, at most 2 pi in "
-           "size, got {!r}: for degrees write np.deg2rad({:g})", angle, angle)
+    refuse(abs(angle) > 2.0 * np.pi * (1 + 1e-12), "an angle is in radians, at most 2 pi, got "
+           "{!r}: for degrees np.deg2rad({:g})", angle, angle)
     return angle

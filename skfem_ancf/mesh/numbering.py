@@ -74,9 +74,7 @@ def default_tags(p: Array, t: Array) -> dict[str, Array]:
 
 def _refused(what: str) -> Callable[..., NoReturn]:
     def refuse(self: Any, *args: Any, **kwargs: Any) -> NoReturn:
-        raise MeshError(
-            f"a MeshBeam cannot be {what}: it is one chain of nodes with sections. Put several "
-            "beams into one Scene and join them, or build the mesh with init_line or init_curve")
+        raise MeshError(f"a MeshBeam cannot be {what}: put several beams into one Scene")
 
     return refuse
 
@@ -147,8 +145,8 @@ class NumberedMesh(Immutable, NearMisses, Mesh2D):
             elements = np.nonzero(elements)[0]
         if not elements.size:
             return np.zeros(0, dtype=np.int32)
-        refuse(elements.dtype.kind not in "iu" or elements.ndim != 1, "elements are numbers, the "
-               "name of a subdomain, a function or a mask, got {!r}", given, error=MeshError)
+        refuse(elements.dtype.kind not in "iu" or elements.ndim != 1, "elements are numbers, a "
+               "subdomain, a function or a mask, got {!r}", given, error=MeshError)
         refuse_any((elements < 0) | (elements >= self.nelements), "the elements are numbered 0 to "
                    "{}, got {}", self.nelements - 1, elements, error=MeshError)
         return elements

@@ -191,10 +191,9 @@ class Finder:
         e, X, outside, tied = self.find(x, chain)
         bad, mesh = ~(outside <= self.allowed), self.mesh
         if bad.any():
-            refuse_any(bad, "the point {:.9g} is outside {}{}: points are given by their position "
-                       "in the reference configuration of height {:.6g}, whose axis runs from {} "
-                       "to {}; {}", x, "the body" if chain is None else "the line that was named",
-                       f" ({bad.sum()} of {len(bad)} points are)" * (len(bad) > 1), mesh.height,
+            refuse_any(bad, "the point {:.9g} is outside {} in the reference configuration of "
+                       "height {:.6g}, whose axis runs from {} to {}; {}", x,
+                       "the body" if chain is None else "the line that was named", mesh.height,
                        mesh.p[:, 0].tolist(), mesh.p[:, -1].tolist(), self.extent, error=MeshError)
         return e, X, tied
 
@@ -301,25 +300,23 @@ def facets_of(mesh: Any, place: Place) -> Array:
     if isinstance(place, str):
         named = mesh.boundaries or {}
         found = named[require_option("boundary", place, named)]
-        refuse(not len(found), "the boundary {!r} is empty: it has no facet of this mesh; others "
-               "are {}", place, _names(mesh), error=MeshError)
+        refuse(not len(found), "the boundary {!r} is empty; others are {}", place, _names(mesh),
+               error=MeshError)
         return found
     if is_point(place):
         return np.array([section_at(mesh, cast("ArrayLike", place))], dtype=np.int32)
     if isinstance(place, np.ndarray):
-        refuse(place.dtype.kind not in "iu" or place.ndim != 1 or not len(place), "facets are a "
-               "one-dimensional array of integers that is not empty, got {!r}; a place may also be "
-               "{}", place, KINDS.rsplit(", or", 1)[0])
-        refuse_any((place < 0) | (place >= mesh.nfacets), "the facets are numbered 0 to {}, got "
-                   "{}: 0 to {} are the sections, then come bottom and top of the {} elements",
-                   mesh.nfacets - 1, place, mesh.p.shape[1] - 1, mesh.nelements, error=MeshError)
+        refuse(place.dtype.kind not in "iu" or place.ndim != 1 or not len(place), "a place is {}, "
+               "got {!r}", KINDS, place)
+        refuse_any((place < 0) | (place >= mesh.nfacets), "the facets are numbered 0 to {}, got {}",
+                   mesh.nfacets - 1, place, error=MeshError)
         return place
     if callable(place):
         x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
         found = satisfying(place, x)
         refuse(not len(found), "the function {!r} selects none of the {} facets, whose middles lie "
-               "from {} to {}; boundaries with names are {}", place, x.shape[1],
-               _pair(x.min(axis=1)), _pair(x.max(axis=1)), _names(mesh), error=MeshError)
+               "from {:.9g} to {:.9g}; boundaries with names are {}", place, x.shape[1],
+               x.min(axis=1), x.max(axis=1), _names(mesh), error=MeshError)
         return found
     if isinstance(place, (tuple, list, set, frozenset)) and len(place) and not all(
             isinstance(p, numbers.Number) for p in place):
@@ -336,8 +333,8 @@ def facets_of(mesh: Any, place: Place) -> Array:
 def node_of(mesh: Any, place: Place) -> int:
     """The node of a place that is one section; MeshError for others."""
     facets = np.asarray(facets_of(mesh, place))
-    refuse(len(facets) != 1 or facets[0] >= mesh.p.shape[1], "boundary {!r} is not one section of "
-           "the beam, as 'left', 'right', or the point of a node", place, error=MeshError)
+    refuse(len(facets) != 1 or facets[0] >= mesh.p.shape[1], "{!r} is not one section of the beam, "
+           "as 'left', 'right', or the point of a node", place, error=MeshError)
     return int(facets[0])
 
 
@@ -359,13 +356,11 @@ def section_at(mesh: Any, point: ArrayLike) -> int:
         found = found[np.abs(Y[found]) <= finder.from_axis(e, X)[0] + finder.equal]
     if len(found) == 1:
         return int(found[0])
-    refuse(len(found), "the point {} is on the sections of the nodes {} at once: name one of them "
-           "as a boundary, or by np.array([number])", _pair(x), found.tolist(), error=MeshError)
+    refuse(len(found), "the point {} is on the sections of the nodes {}: give np.array([number])",
+           _pair(x), found.tolist(), error=MeshError)
     k = int(np.argmin(off))
-    raise MeshError(
-        f"the point {_pair(x)} is on no section between two elements: the nearest is that of node "
-        f"{k} with its axis at {_pair(mesh.p[:, k])}, {off[k]:.6g} away; give that point, or put a "
-        "node there")
+    raise MeshError(f"the point {_pair(x)} is on no section between two elements: the nearest is "
+                    f"that of node {k} at {_pair(mesh.p[:, k])}, {off[k]:.6g} away")
 
 
 def _pair(x: Array) -> str:
@@ -382,7 +377,6 @@ def satisfying(test: Callable[[Array], Any], x: Array, what: str = "a place") ->
     found = ask(f"the function that names {what}, of x of shape {x.shape},", test, x)
     chosen = np.asarray(found)
     refuse(is_masked(found) or chosen.shape != x.shape[1:] or chosen.dtype != bool, "a function "
-           "that names {} takes points x of shape (2, n) and returns n truth values, as lambda x: "
-           "x[0] > 1; for n = {} it returned {} of shape {}", what, x.shape[1], chosen.dtype,
-           chosen.shape, error=CallbackError)
+           "that names {} returns n truth values for points x (2, n), as lambda x: x[0] > 1; for "
+           "n = {} it returned {!r}", what, x.shape[1], found, error=CallbackError)
     return np.nonzero(chosen)[0].astype(np.int32)
