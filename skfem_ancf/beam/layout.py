@@ -10,7 +10,7 @@ import numpy as np
 
 from .beam import Beam
 from .domain import Domain
-from ..core import Array, NameUnknown, refuse
+from ..core import Array, InputError, NameUnknown, refuse, shown
 from .rigid import RigidBody
 
 #: Argument of :func:`select_beam`: a Beam, its name or number; None for the only one.
@@ -30,17 +30,18 @@ class Layout:
 
     def __init__(self, *members: Beam | RigidBody | Domain) -> None:
         for one in members:
-            refuse(not isinstance(one, (Beam, RigidBody, Domain)), "a scene is made of Beams, "
-                   "RigidBodies and Domains, got {!r}", one)
+            if not isinstance(one, (Beam, RigidBody, Domain)):
+                raise InputError("a scene is made of Beams, RigidBodies and Domains, got "
+                                 f"{shown(one)}")
         refuse(not members, "a scene needs at least a Beam, a RigidBody or a Domain, got none")
         names = [one.name for one in members if one.name is not None]
         refuse(len(set(names)) < len(names) or len(set(map(id, members))) < len(members), "the "
                "beams of a scene must be different, with different names, got {}", names)
-        self.beams = tuple(b for b in members if isinstance(b, Beam))
-        self.bodies = tuple(b for b in members if isinstance(b, RigidBody))
-        self.domains = tuple(b for b in members if isinstance(b, Domain))
+        self.beams = tuple([b for b in members if isinstance(b, Beam)])
+        self.bodies = tuple([b for b in members if isinstance(b, RigidBody)])
+        self.domains = tuple([b for b in members if isinstance(b, Domain)])
         self.members: tuple[Any, ...] = *self.beams, *self.bodies, *self.domains
-        *self._first, self.N = accumulate((b.N for b in self.members), initial=0)
+        *self._first, self.N = accumulate([b.N for b in self.members], initial=0)
         self._numbers = {id(b): k for k, b in enumerate(self.members)}
 
     def __reduce__(self):

@@ -246,7 +246,8 @@ def require_finite_scalar(name: str, value: Any) -> float:
         raise InputError(f"{name} is too large for a float: {shown(value)}") from None
     except (TypeError, ValueError):
         raise InputError(f"{name} must be a number, got {shown(value)}") from None
-    refuse(not -np.inf < value < np.inf, "{} must be finite, got {!r}", name, value)
+    if not -np.inf < value < np.inf:
+        raise InputError(f"{name} must be finite, got {shown(value)}")
     return value
 
 
@@ -259,7 +260,8 @@ def _is_real(value):
 def require_positive(name: str, value: object, unit: str = "") -> float:
     """A positive finite number; ``unit`` appears in the message."""
     value = require_finite_scalar(name, value)
-    refuse(value <= 0.0, "{} must be positive{}, got {!r}", name, unit and f" ({unit})", value)
+    if value <= 0.0:
+        raise InputError(f"{name} must be positive{unit and f' ({unit})'}, got {shown(value)}")
     return value
 
 
@@ -445,22 +447,22 @@ def require_text(name: str, value: Any) -> Any:
 
 def require_label(name: str, value: object) -> str | None:
     """As :func:`require_text`, but not empty."""
-    refuse(isinstance(value, str) and not value, "{} must be a text, or None for none, got ''",
-           name)
+    if isinstance(value, str) and not value:
+        raise InputError(f"{name} must be a text, or None for none, got ''")
     return require_text(name, value)
 
 
 def require_flag(name: str, value: object) -> bool:
     """True or False."""
-    refuse(not isinstance(value, (bool, np.bool_)), "{} must be True or False, got {!r}", name,
-           value)
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, got {shown(value)}")
     return bool(value)
 
 
 def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
     """An instance with these attributes; ``kind`` is its name in the message."""
-    refuse(isinstance(value, type) or not all(hasattr(value, a) for a in attributes),
-           "{} must be a {}, got {!r}", name, kind, value)
+    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
+        raise InputError(f"{name} must be a {kind}, got {shown(value)}")
     return value
 
 

@@ -66,10 +66,12 @@ def product_rule(axis: Rule, section: Rule) -> Rule:
 
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
     """Lagrange polynomials of nodes (n,) at points (m,), shape (m, n)."""
-    nodes, x = np.asarray(nodes, dtype=float), np.atleast_1d(x)
+    nodes, x = np.asarray(nodes, dtype=float), np.array(x, ndmin=1)
     refuse(len(set(nodes.tolist())) < nodes.size, "nodes must be different, got {!r}", nodes)
-    others = [(a, np.delete(nodes, i)) for i, a in enumerate(nodes)]
-    return np.array([np.prod((x[:, None] - b) / (a - b), axis=1) for a, b in others]).T
+    same = nodes[:, None] == nodes
+    # factors (m, i, j) of the i-th polynomial, 1 for j = i
+    factors = (x[:, None, None] - nodes) / (nodes[:, None] - nodes + same)
+    return np.where(same, 1.0, factors).prod(axis=-1)
 
 
 @lru_cache

@@ -7,7 +7,7 @@ import sys
 from functools import cache
 from importlib.util import find_spec
 
-from .errors import refuse
+from .errors import InputError, shown
 
 #: Environment variable: "0" disables Numba, "1" compiles at once, "auto" (default) compiles
 #: when the process has worked long enough in NumPy.
@@ -17,9 +17,10 @@ VARIABLE = "SKFEM_ANCF_COMPILED"
 def compiled_setting() -> str:
     """The environment variable ``SKFEM_ANCF_COMPILED``: "0", "1" or "auto"; else InputError."""
     value = os.environ.get(VARIABLE, "auto")
-    refuse(value not in ("0", "1", "auto"), "the environment variable {} must be 0 (without "
-           "Numba), 1 (compile at once) or auto (when it pays), got {!r}", VARIABLE, value)
-    return value
+    if value in ("0", "1", "auto"):
+        return value
+    raise InputError(f"the environment variable {VARIABLE} must be 0 (without Numba), 1 (compile "
+                     f"at once) or auto (when it pays), got {shown(value)}")
 
 
 def compiled_off() -> str | None:

@@ -439,9 +439,10 @@ class ElementBeam(Immutable, Element):
         MeshError
             If the mesh is curved and its ``sections`` are not those of the element.
         """
-        refuse(mesh.sections != self.mesh_sections and not mesh.is_straight, "the sections of "
-               "{!r} are {}, those of the curved mesh {}: use mesh.with_sections({!r})", self,
-               self.mesh_sections, mesh.sections, self.mesh_sections, error=MeshError)
+        of = self.mesh_sections
+        refuse(mesh.sections != of and not mesh.is_straight, "the sections of {!r} are {}, those "
+               "of the curved mesh {}: use mesh.with_sections({!r})", self, of, mesh.sections, of,
+               error=MeshError)
         known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y}
         if mesh.p_XY is not None:
             known[1, 1] = mesh.p_XY

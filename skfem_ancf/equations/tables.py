@@ -201,16 +201,16 @@ class Tables:
         # Stresses are strains times moduli in linear laws without coupling; of cables half the
         # length, or half the curvature of a radius of half the height, are far from sections that
         # overlap.
-        beams, nodes, rest, limits = self.system.beams, [_NO_NODES], [np.zeros((8, 0))], []
-        for beam, s in zip(beams, self.system.slices):
+        system, nodes, rest, limits = self.system, [_NO_NODES], [np.zeros((8, 0))], []
+        for beam, s in zip(system.beams, system.slices):
             axis = beam.q0_local.view(complex).reshape(-1, beam.nd // 2)[:, :2]
             (left, a), (right, b) = axis[beam.mesh.t].transpose(0, 2, 1)
             parts = np.array([a, b, right - left, a * b.conj()])
             rest.append(parts.view(float).reshape(4, -1, 2).transpose(0, 2, 1).reshape(8, -1))
             nodes.append(s.start + beam.nd * beam.mesh.t)
-        high = max((beam.mesh.height for beam in beams), default=0.0)
+        high = max([beam.mesh.height for beam in system.beams], default=0.0)
         if all(t.kind == CABLE and t.law.kind == LINEAR and t.rows.shape[1] == len(t.H[0])
-               for t in body.packs) and all(beam.mesh.is_straight for beam in beams):
+               for t in body.packs) and all(beam.mesh.is_straight for beam in system.beams):
             for t in body.packs:
                 size = np.array([[2.0], [high]]) / t.H.reshape(len(t.H), 2, -1)
                 limits.append(size.take(t.at[:, OF_H], 0).ravel())

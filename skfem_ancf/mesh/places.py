@@ -295,14 +295,14 @@ def facets_of(mesh: Any, place: Place) -> Array:
     # function of points (2, n) that returns n truth values, for the facets whose midpoints satisfy
     # it; numbers of facets in an array of integers; a tuple, list or set of places, or an array (n,
     # 2) of points. A scikit-fem ``OrientedBoundary`` is returned as it is.
-    refuse(is_masked(place), "a place must not have masked values, got {!r}", place)
-    place = points_of_rows(place)
     if isinstance(place, str):
         named = mesh.boundaries or {}
         found = named[require_option("boundary", place, named)]
-        refuse(not len(found), "the boundary {!r} is empty; others are {}", place, _names(mesh),
-               error=MeshError)
+        if not len(found):
+            raise MeshError(f"the boundary {place!r} is empty; others are {_names(mesh)}")
         return found
+    refuse(is_masked(place), "a place must not have masked values, got {!r}", place)
+    place = points_of_rows(place)
     if is_point(place):
         return np.array([section_at(mesh, cast("ArrayLike", place))], dtype=np.int32)
     if isinstance(place, np.ndarray):

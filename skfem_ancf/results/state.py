@@ -257,9 +257,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
                  seen: int = UNSEEN) -> None:
         m = system.constraints.m
         multipliers = np.zeros(m) if multipliers is None else multipliers
-        for name, value, size in (("u", u, system.N), ("multipliers", multipliers, m)):
-            refuse(np.shape(value) != (size,), "{} must have shape ({},) in this scene, got {}",
-                   name, size, np.shape(value))
+        refuse(u.shape != (system.N,) or multipliers.shape != (m,), "u and multipliers must have "
+               "shapes ({},) and ({},) in this scene, got {} and {}", system.N, m, u.shape,
+               multipliers.shape)
         vars(self).update(
             system=system, u=u, load=load, multipliers=multipliers, converged=converged,
             iterations=iterations, message=message, steps=tuple(steps), t=t,

@@ -167,9 +167,11 @@ class LayerPoints:
         value = getattr(self.layer, name)
         if callable(value):
             return self.layer.measure.values(self, name, whole)
-        refuse(value is None and name == "density", "{!r} has no density: give one to use mass or "
-               "gravity", self.layer.material)
-        return 1.0 if value is None else value
+        if value is not None:
+            return value
+        refuse(name == "density", "{!r} has no density: give one to use mass or gravity",
+               self.layer.material)
+        return 1.0
 
 
 class Across(Immutable):

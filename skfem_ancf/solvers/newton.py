@@ -225,8 +225,8 @@ class Search:
         """The result with its message."""
         # If it was not found easily, the path from the reference configuration is followed: has the
         # load a maximum below 1?
-        system, loads = self.system, [0.0]
-        if (not result.doubt and (len(self.attempts) > 1 or (result.iterations > SURE and any(
+        system, loads, n = self.system, [0.0], result.iterations
+        if (not result.doubt and (len(self.attempts) > 1 or (n > SURE and any(
                 hasattr(load, "psi") for load in system.loads)))
                 and self._auto and self.stable and self.route.proportional
                 and not (self.stabilised_by_loads or self.touches) and system.clock is None):
@@ -247,8 +247,8 @@ class Search:
                         f"the load level {point.load:.4g}; the equilibrium found lies beyond it, "
                         "and need not be the only one")
         result.converged, result.attempts = True, tuple(self.attempts)
-        result.message = (f"converged in {len(result.steps)} load steps, {result.iterations} "
-                          f"iterations, by {self.attempts[-1].strategy}")
+        result.message = (f"converged in {len(result.steps)} load steps, {n} iterations, by "
+                          f"{self.attempts[-1].strategy}")
         if len(self.attempts) > 1:
             result.message += f"; given up: {_listed(self.attempts[:-1])}"
         if result.doubt:
