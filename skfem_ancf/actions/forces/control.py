@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...beam import Layout, RigidBody, WhichBeam
+from ...beam.kernels.moments import mean_turning
 from ...core import (Array, InputError, ask_array, ask_number, refuse, require_function,
                      require_option, require_positive, shown)
 from ...mesh.places import is_point
@@ -15,7 +16,7 @@ from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol
 from ..bound import differences
 from .base import ForceElement
-from .kernels import turned, turning
+from .kernels import turned
 
 KINDS = ("force", "moment")
 #: Round-off relative to the sampling time.
@@ -123,7 +124,7 @@ class Control(ForceElement):
         for (name, _), start in zip(self.sections, self._starts):
             y, angle, g = np.append(x[k], start)[:, None], np.empty(1), np.empty((4, 1))
             turned(np.array([[0.0], [0.0], [1.0], [0.0]]), y, np.zeros(1), angle)
-            turning(y, g)
+            mean_turning(y, y, g)
             out[name] = MeasuredSection(float(angle[0]), float(g[:2, 0] @ v[k]))
             k += 1
         return out
@@ -164,7 +165,7 @@ class Control(ForceElement):
         out = np.zeros(np.shape(x))
         if self.kind == "moment":
             g = np.empty((4, 1))
-            turning(np.reshape(x[:2], (4, 1)), g)
+            mean_turning(*2 * [np.reshape(x[:2], (4, 1))], g)
             out[:2] = value * g.reshape(2, 2)
         else:
             out[0] = value

@@ -20,11 +20,13 @@ from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES
                               is_clear, set_clear)
 
 #: Kinds of elements.
-SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))
-#: Parameters of an element. Spring: stiffness, free length, damping. Torsion: stiffness, damping,
-#: cosine and sine of the free angle. Foundation: stiffness, damping, normal, and 1 if
-#: compression-only. Drag: factors of the squared normal and tangential velocity.
-#: Then rows of the vectors, and of the derivatives by them. Numba compiles for each int.
+KINDS = 4
+SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(KINDS))
+#: Parameters of an element. All but drags have a coordinate, its stiffness and damping, two
+#: numbers, of a spring the free length, of torsion cosine and sine of the free angle, of a
+#: foundation the normal, and 1 if they act at positive coordinates only. Those of a drag are
+#: factors of the squared normal and tangential velocity. Then rows of the vectors, and of the
+#: derivatives by them. Numba compiles for each int.
 NUMBERS, VECTORS, BLOCK = map(np.int64, (5, 4, 16))
 TINY = 1e-200
 TURN = 2.0 * np.pi
@@ -90,15 +92,20 @@ def vectors_of(tables, u, factor, out):
 @source
 def _part(kinds, kind, rows, x):
     """A view of the rows of one kind."""
-    n = kinds.number
-    return shaped(x[:rows * n], (rows, n))[:, kinds.ends[kind]:kinds.ends[kind + 1]]
+    return _table(kinds, rows, x)[:, kinds.ends[kind]:kinds.ends[kind + 1]]
 
 
 @source
-def _of(kinds, kind, y, w, rows, out):
-    """Parameters, vectors, end vectors or rates, and results of one kind."""
+def _table(kinds, rows, x):
+    """A view of the rows of all kinds."""
+    return shaped(x[:rows * kinds.number], (rows, kinds.number))
+
+
+@source
+def _of(kinds, kind, y, q):
+    """Parameters, vectors, and numbers (n,) of one kind."""
     return (_part(kinds, kind, NUMBERS, kinds.numbers), _part(kinds, kind, VECTORS, y),
-            _part(kinds, kind, VECTORS, w), _part(kinds, kind, rows, out))
+            q[kinds.ends[kind]:kinds.ends[kind + 1]])
 
 
 #: Values of ``what``; from PUSHING on of elements whose stiffness changes its pattern alone: their
@@ -114,17 +121,16 @@ def turns_of(tables):
 
 
 @source
-def run_kinds(tables, what, y, w, factor, out):
-    if tables.number > 0:
-        kinds = Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
-        of_kinds(kinds, what, y, w, factor, out)
+def kinds_of(tables):
+    """The :class:`Kinds` of a scene."""
+    return Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
 
 
 @source
 def _evaluate(tables, what, t, factor, y, w, out):
     """Evaluate ``what`` for all kinds and for user-defined elements."""
     if tables.number > 0:
-        run_kinds(tables, what, y, w, factor, out)
+        of_kinds(kinds_of(tables), what, y, w, factor, out)
     if tables.custom > 0:
         call_custom(ELEMENTS, tables.custom, what, t, factor, y, w, out)
 
@@ -154,8 +160,7 @@ def add_elastic_force(tables, t, span, u0, u1, f):
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
     if tables.paired > 0 and not at_rest(tables, u0, u1):
         _add_pairs(tables, span, u0, u1, f)
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
+    _ask(tables, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
 
 @source
@@ -183,8 +188,7 @@ def add_resisting_force(tables, t, u, v, f):
     """Add the velocity-dependent part of the force."""
     if tables.start.size > 0:
         _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
+    _ask(tables, _at(RUBBING, t), u, v, f)
 
 
 @apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
@@ -200,6 +204,13 @@ def add_contact(contacts, asked, u, v, out):
 
 
 @source
+def _ask(tables, request, u, v, out):
+    """Add the answer of the obstacles to a :class:`~skfem_ancf.actions.contact.tables.Request`."""
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, request, u, v, out)
+
+
+@source
 def _at(what, t):
     return Request(what, t, 0.0, 0.0, NONE, NONE)
 
@@ -207,16 +218,13 @@ def _at(what, t):
 @source
 def add_contact_tangent(tables, t, span, u0, u1, A):
     """Add the derivative of the mean contact force by u1 to a band: twice, unless u0 = u1."""
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, Request(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
+    _ask(tables, Request(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
 
 
 @source
 def add_friction_tangent(tables, t, factor, u, v, A):
     """Add the derivative of friction and damping to a band; that by velocities times a factor."""
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, Request(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
-                    A.flat)
+    _ask(tables, Request(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v, A.flat)
 
 
 @source
@@ -229,8 +237,7 @@ def nothing_touches(tables, u):
 @source
 def contact_work(tables, t, u, du, f):
     """Product of the contact force at u and du; f is workspace, zero on return."""
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, _at(FORCE, t), u, u, f)
+    _ask(tables, _at(FORCE, t), u, u, f)
     if tables.changing > tables.paired:
         call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
     if tables.paired > 0:
@@ -244,8 +251,7 @@ def contact_work(tables, t, u, du, f):
 def contact_along(tables, t, u, du, out):
     """Derivative of :func:`contact_work` along du, and the largest slip of an element, (2,)."""
     out[0], out[1] = 0.0, 0.0
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, _at(ALONG, t), u, du, out)
+    _ask(tables, _at(ALONG, t), u, du, out)
     if tables.changing > 0:
         call_custom(ELEMENTS, tables.custom, np.int64(ALONG_PUSHING), t, 0.0, u, du, out)
 
@@ -259,8 +265,7 @@ def set_contact_rate(tables, dt):
 def augment_contact(tables, t, u, out):
     """Augment pressures where penetration at u is too large; their number goes to out, (1,)."""
     out[0] = 0.0
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, _at(AUGMENT, t), u, u, out)
+    _ask(tables, _at(AUGMENT, t), u, u, out)
 
 
 @source
@@ -268,8 +273,7 @@ def settle_contact(tables, t, span, u0, u1, out):
     """Update the history data at the end of a step; the dissipated energy goes to out, (1,)."""
     out[0] = 0.0
     follow_turns(tables, u1)
-    if tables.contacts.number > 0:
-        add_contact(tables.contacts, Request(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
+    _ask(tables, Request(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
 
 
 @source
@@ -374,45 +378,9 @@ def of_kinds(kinds, what, y, w, factor, out):
 
 
 @source
-def elastic(kinds, y0, y1, F):
-    """Elastic forces of the kinds, means between two states, which may be equal."""
-    p, a, b, f = _of(kinds, SPRING, y0, y1, VECTORS, F)
-    for e in indices(p.shape[1]):  # V = k (l - L)^2 / 2, and (V1 - V0) / (l1^2 - l0^2) (d0 + d1)
-        length = (np.sqrt(a[0, e] * a[0, e] + a[1, e] * a[1, e])
-                  + np.sqrt(b[0, e] * b[0, e] + b[1, e] * b[1, e]))
-        c = 0.5 * p[0, e] * (1.0 - 2.0 * p[1, e] / np.maximum(length, TINY))
-        f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
-    p, a, b, f = _of(kinds, TORSION, y0, y1, VECTORS, F)
-    mean_moments(p, a, b, kinds.turns, f)
-    p, a, b, f = _of(kinds, FOUNDATION, y0, y1, VECTORS, F)
-    for e in indices(p.shape[1]):
-        s0 = pressed(p[2, e], p[3, e], a[0, e], a[1, e])
-        s1 = pressed(p[2, e], p[3, e], b[0, e], b[1, e])
-        p0 = s0 * (1.0 - p[4, e] * (s0 < 0.0))
-        p1 = s1 * (1.0 - p[4, e] * (s1 < 0.0))
-        same = np.abs(s1 - s0) < TINY
-        share = (p1 - p0) / (s1 - s0 + same) * (1.0 - same) + same * (
-            1.0 - p[4, e] * (s0 + s1 < 0.0))
-        c = 0.5 * p[0, e] * (p0 + p1) * share
-        f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
-
-
-@source
-def mean_moments(p, a, b, last, f):
-    """Mean forces of torsional springs between two states."""
-    turn = np.empty((2, a.shape[1]))
-    turned(p, a, last, turn[0])
-    turned(p, b, last, turn[1])
-    mean_turning(a, b, f)
-    for i in indices(4):
-        for e in indices(p.shape[1]):
-            f[i, e] *= 0.5 * p[0, e] * (turn[0, e] + turn[1, e])
-
-
-@source
-def pressed(nx, ny, x, y):
-    """Displacement of a point along a normal."""
-    return nx * x + ny * y
+def distance(d, e):
+    """Length of vectors number e, not zero."""
+    return np.sqrt(np.maximum(d[0, e] * d[0, e] + d[1, e] * d[1, e], TINY))
 
 
 @source
@@ -426,100 +394,130 @@ def turned(p, y, last, out):
 
 
 @source
-def turning(y, g):
-    """Derivative of the angle from e to d by both."""
-    for e in indices(g.shape[1]):
-        d, s = y[0, e] ** 2 + y[1, e] ** 2, y[2, e] ** 2 + y[3, e] ** 2
-        g[0, e], g[1, e] = -y[1, e] / d, y[0, e] / d
-        g[2, e], g[3, e] = y[3, e] / s, -y[2, e] / s
+def coordinates(kinds, y):
+    """Elongations, angles and displacements along normals, (n,); zero for drags."""
+    q = np.zeros(kinds.number)
+    p, d, s = _of(kinds, SPRING, y, q)
+    for e in indices(s.size):
+        s[e] = distance(d, e) - p[2, e]
+    p, d, s = _of(kinds, TORSION, y, q)
+    turned(p, d, kinds.turns, s)
+    p, d, s = _of(kinds, FOUNDATION, y, q)
+    for e in indices(s.size):
+        s[e] = p[2, e] * d[0, e] + p[3, e] * d[1, e]
+    return q
 
 
 @source
-def resisting(kinds, y, w, G):
+def mean_slopes(kinds, y0, y1):
+    """Means of the derivatives of coordinates by the vectors, (4, n): times the change of these
+    the change of the coordinates. For equal vectors, which may be one array, the derivatives."""
+    g = np.zeros((4, kinds.number))
+    flat = g.reshape(g.size)
+    a, b, f = (_part(kinds, SPRING, VECTORS, y0), _part(kinds, SPRING, VECTORS, y1),
+               _part(kinds, SPRING, VECTORS, flat))
+    for e in indices(f.shape[1]):
+        c = 1.0 / (distance(a, e) + distance(b, e))
+        f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
+    a, b, f = (_part(kinds, TORSION, VECTORS, y0), _part(kinds, TORSION, VECTORS, y1),
+               _part(kinds, TORSION, VECTORS, flat))
+    if f.shape[1] > 0:
+        mean_turning(a, b, f)
+    p, f = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
+            _part(kinds, FOUNDATION, VECTORS, flat))
+    for e in indices(f.shape[1]):
+        f[0, e], f[1, e] = p[2, e], p[3, e]
+    return g
+
+
+@source
+def add_bends(kinds, y, g, T, D):
+    """Add T (n,) times the second derivatives of coordinates with derivatives g; (i, j) at 4 i + j.
+    """
+    _, d, c = _of(kinds, SPRING, y, T)
+    h, s = g[:, :c.size], _part(kinds, SPRING, BLOCK, D)
+    for e in indices(c.size):
+        k = c[e] / distance(d, e)
+        s[0, e] += k * h[1, e] * h[1, e]
+        s[5, e] += k * h[0, e] * h[0, e]
+        s[1, e] -= k * h[0, e] * h[1, e]
+        s[4, e] -= k * h[0, e] * h[1, e]
+    _, d, c = _of(kinds, TORSION, y, T)
+    s = _part(kinds, TORSION, BLOCK, D)
+    for k in range(2):  # that of the angle of d, and minus that of e
+        for e in indices(c.size):
+            x, z = d[2 * k, e], d[2 * k + 1, e]
+            r = (1.0 - 2.0 * k) * c[e] / (x * x + z * z) ** 2
+            s[10 * k, e] += 2.0 * r * x * z
+            s[10 * k + 5, e] -= 2.0 * r * x * z
+            s[10 * k + 1, e] += r * (z * z - x * x)
+            s[10 * k + 4, e] += r * (z * z - x * x)
+
+
+@source
+def elastic(kinds, y0, y1, F):
+    """Elastic forces of the kinds, means between two states, which may be equal."""
+    p, f, g = _table(kinds, NUMBERS, kinds.numbers), _table(kinds, VECTORS, F), mean_slopes(
+        kinds, y0, y1)
+    q, r = coordinates(kinds, y0), coordinates(kinds, y1)
+    for e in indices(q.size):  # (V1 - V0) / (q1 - q0), V = k q^2 / 2 or zero for q < 0
+        a, b = q[e] * (1.0 - p[4, e] * (q[e] < 0.0)), r[e] * (1.0 - p[4, e] * (r[e] < 0.0))
+        same = np.abs(r[e] - q[e]) < TINY
+        share = (b - a) / (r[e] - q[e] + same) * (1.0 - same) + same * (
+            1.0 - p[4, e] * (q[e] + r[e] < 0.0))
+        q[e] = 0.5 * p[0, e] * (a + b) * share
+    for i in range(4):
+        for e in indices(q.size):
+            f[i, e] = q[e] * g[i, e]
+
+
+@source
+def resisting(kinds, y, w, F):
     """Velocity-dependent forces of the kinds for rates w."""
-    p, d, v, f = _of(kinds, SPRING, y, w, VECTORS, G)
-    for e in indices(p.shape[1]):
-        square = d[0, e] * d[0, e] + d[1, e] * d[1, e]
-        c = p[2, e] * (d[0, e] * v[0, e] + d[1, e] * v[1, e]) / np.maximum(square, TINY)
-        f[0, e], f[1, e] = c * d[0, e], c * d[1, e]
-    p, d, v, f = _of(kinds, TORSION, y, w, VECTORS, G)
-    turning(d, f)
-    for e in indices(p.shape[1]):
-        c = p[1, e] * (f[0, e] * v[0, e] + f[1, e] * v[1, e] + f[2, e] * v[2, e]
-                       + f[3, e] * v[3, e])
-        f[0, e], f[1, e], f[2, e], f[3, e] = c * f[0, e], c * f[1, e], c * f[2, e], c * f[3, e]
-    p, d, v, f = _of(kinds, FOUNDATION, y, w, VECTORS, G)
-    for e in indices(p.shape[1]):
-        apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
-        c = p[1, e] * (1.0 - p[4, e] * apart) * pressed(p[2, e], p[3, e], v[0, e], v[1, e])
-        f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
-    p, d, v, f = _of(kinds, DRAG, y, w, VECTORS, G)
+    p, v, f = (_table(kinds, NUMBERS, kinds.numbers), _table(kinds, VECTORS, w),
+               _table(kinds, VECTORS, F))
+    q, g = coordinates(kinds, y), mean_slopes(kinds, y, y)
+    for e in indices(q.size):
+        q[e] = p[1, e] * (1.0 - p[4, e] * (q[e] < 0.0)) * (
+            g[0, e] * v[0, e] + g[1, e] * v[1, e] + g[2, e] * v[2, e] + g[3, e] * v[3, e])
+    for i in range(4):
+        for e in indices(q.size):
+            f[i, e] = q[e] * g[i, e]
+    p, d, v, f = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, VECTORS, y),
+                  _part(kinds, DRAG, VECTORS, w), _part(kinds, DRAG, VECTORS, F))
     for e in indices(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
         along, across = v[0, e] * x + v[1, e] * z, v[1, e] * x - v[0, e] * z
-        q, r = p[1, e] * np.abs(along) * along, p[0, e] * np.abs(across) * across
-        f[0, e], f[1, e] = q * x - r * z, q * z + r * x
+        a, b = p[1, e] * np.abs(along) * along, p[0, e] * np.abs(across) * across
+        f[0, e], f[1, e] = a * x - b * z, a * z + b * x
 
 
 @source
 def derivatives(kinds, y, w, factor, D):
     """Derivatives of forces, and factor times those of ``resisting`` by w; (i, j) at 4 i + j."""
-    p, d, v, s = _of(kinds, SPRING, y, w, BLOCK, D)
-    for e in indices(p.shape[1]):
-        square = np.maximum(d[0, e] * d[0, e] + d[1, e] * d[1, e], TINY)
-        k = p[0, e] * p[1, e] / np.sqrt(square)
-        c = (k + factor * p[2, e]) / square
-        s[0, e] = p[0, e] - k + c * d[0, e] * d[0, e]
-        s[5, e] = p[0, e] - k + c * d[1, e] * d[1, e]
-        s[1, e] = c * d[0, e] * d[1, e]
-        s[4, e] = c * d[0, e] * d[1, e]
-    p, d, v, s = _of(kinds, TORSION, y, w, BLOCK, D)
-    moment_derivatives(p, d, kinds.turns, factor, s)
-    p, d, v, s = _of(kinds, FOUNDATION, y, w, BLOCK, D)
-    for e in indices(p.shape[1]):
-        apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
-        c = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * apart)
-        s[0, e], s[5, e] = c * p[2, e] * p[2, e], c * p[3, e] * p[3, e]
-        s[1, e], s[4, e] = c * p[2, e] * p[3, e], c * p[2, e] * p[3, e]
-    p, d, v, s = _of(kinds, DRAG, y, w, BLOCK, D)
+    p, s, c = _table(kinds, NUMBERS, kinds.numbers), _table(kinds, BLOCK, D), np.empty(kinds.number)
+    q, g = coordinates(kinds, y), mean_slopes(kinds, y, y)
+    for e in indices(q.size):
+        c[e] = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * (q[e] < 0.0))
+        q[e] = p[0, e] * q[e]
+    for i in range(4):
+        for j in range(4):
+            for e in indices(q.size):
+                s[4 * i + j, e] = c[e] * g[i, e] * g[j, e]
+    add_bends(kinds, y, g, q, D)
+    p, d, v, s = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, VECTORS, y),
+                  _part(kinds, DRAG, VECTORS, w), _part(kinds, DRAG, BLOCK, D))
     for e in indices(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
-        q = 2.0 * factor * p[1, e] * np.abs(v[0, e] * x + v[1, e] * z)
-        r = 2.0 * factor * p[0, e] * np.abs(v[1, e] * x - v[0, e] * z)
-        s[0, e], s[5, e] = q * x * x + r * z * z, q * z * z + r * x * x
-        s[1, e], s[4, e] = (q - r) * x * z, (q - r) * x * z
-
-
-@source
-def moment_derivatives(p, d, last, factor, s):
-    """Derivatives of torsional springs."""
-    g, turn = np.empty(d.shape), np.empty(d.shape[1])
-    turning(d, g)
-    turned(p, d, last, turn)
-    for i in range(4):
-        for j in range(4):
-            for e in indices(p.shape[1]):
-                s[4 * i + j, e] = (p[0, e] + factor * p[1, e]) * g[i, e] * g[j, e]
-    for k in range(2):  # the second derivative of the angle of d, and minus that of e
-        for e in indices(p.shape[1]):
-            x, z = d[2 * k, e], d[2 * k + 1, e]
-            c = (1.0 - 2.0 * k) * p[0, e] * turn[e] / (x * x + z * z) ** 2
-            s[10 * k, e] += 2.0 * c * x * z
-            s[10 * k + 5, e] -= 2.0 * c * x * z
-            s[10 * k + 1, e] += c * (z * z - x * x)
-            s[10 * k + 4, e] += c * (z * z - x * x)
+        a = 2.0 * factor * p[1, e] * np.abs(v[0, e] * x + v[1, e] * z)
+        b = 2.0 * factor * p[0, e] * np.abs(v[1, e] * x - v[0, e] * z)
+        s[0, e], s[5, e] = a * x * x + b * z * z, a * z * z + b * x * x
+        s[1, e], s[4, e] = (a - b) * x * z, (a - b) * x * z
 
 
 def potential(tables: ForceTables, y: np.ndarray) -> float:
     """Potentials of the kinds at vectors y, shape (rows,)."""
-    p, d = _part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, VECTORS, y)
-    total = 0.5 * np.sum(p[0] * (np.hypot(d[0], d[1]) - p[1]) ** 2)
-    p, d = _part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, VECTORS, y)
-    angle = np.empty(p.shape[1])
-    turned(p, d, turns_of(tables), angle)
-    total += 0.5 * np.sum(p[0] * angle**2)
-    p, d = _part(tables, FOUNDATION, NUMBERS, tables.numbers), _part(tables, FOUNDATION, VECTORS, y)
-    s = pressed(p[2], p[3], d[0], d[1])
-    return float(total + 0.5 * np.sum(p[0] * s**2 * (1.0 - p[4] * (s < 0.0))))
+    q, p = coordinates(kinds_of(tables), y), _table(tables, NUMBERS, tables.numbers)
+    return float(0.5 * np.sum(p[0] * q**2 * (1.0 - p[4] * (q < 0.0))))

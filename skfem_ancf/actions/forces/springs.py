@@ -9,7 +9,6 @@ import numpy as np
 import scipy
 
 from ...beam.distribution import AXIS, Facets, groups_of, surfaces_of
-from ...beam.kernels.moments import mean_turning
 from ...beam.kernels.section import beam_gradients
 from ...beam.kinematics import probe_reference
 from ...beam import Layout, RigidBody, WhichBeam, on_body, select_beam
@@ -21,7 +20,8 @@ from ..loads import EndMoment
 from ..places import GROUND, Vector, both_of, named_place, point, section
 from ..symbols import Symbol, faces_of, middle
 from .base import ForceElement, KernelElement
-from .kernels import DRAG, FOUNDATION, SPRING, TINY, TORSION, turned, turning
+from .kernels import (BLOCK, DRAG, FOUNDATION, KINDS, SPRING, TORSION, VECTORS, Kinds, add_bends,
+                      coordinates, mean_slopes)
 
 # user-defined laws of springs and dashpots: force of elongation, angle or rate
 
@@ -171,21 +171,34 @@ def end_of(layout: Layout, place: Any) -> Vector:
 
 
 class ElasticElement(ForceElement):
-    """A force ``k(q) + damping(dq / dt)`` against a coordinate q, an elongation or an angle. A
-    subclass defines :meth:`coordinate` and :meth:`mean_slope`."""
+    """A force ``k(q) + damping(dq / dt)`` against a coordinate q of the kernels, an elongation or
+    an angle."""
 
     k: Proportional | Law
     damping: Proportional | Law
-    #: Reference coordinate for the difference step of a law.
-    _scale = 1.0
+    #: Reference coordinate for the difference step of a law; that at the end of the last step.
+    _scale, _last = 1.0, 0.0
+    #: Of a bound one.
+    _part: KernelElement
+
+    def _alone(self, *places: Array) -> tuple[Any, ...]:
+        """The tables of kernels for this element alone, and vectors for places of its links."""
+        kinds = Kinds(1, (np.arange(KINDS + 1) > self._part.kind).astype(np.int64), np.array(
+            (0.0, 0.0, *self._part.numbers[2:])), np.array([self._last]))
+        return kinds, *(np.append(x, np.zeros(VECTORS - x.size)) for x in places)
 
     def coordinate(self, x: Array) -> tuple[float, Array]:
         """q and its derivative by the links, (n, 2)."""
-        raise NotImplementedError
+        kinds, y = self._alone(x)
+        return (float(coordinates(kinds, y)[0]),
+                mean_slopes(kinds, y, y).reshape(2, 2)[:len(x)])
 
     def mean_slope(self, x: Array, y: Array) -> Array:
         """G (n, 2) with ``G . (y - x) = q(y) - q(x)``."""
-        raise NotImplementedError
+        return mean_slopes(*self._alone(x, y)).reshape(2, 2)[:len(x)]
+
+    def parts(self) -> list[KernelElement] | None:
+        return None if isinstance(self.k, Law) or isinstance(self.damping, Law) else [self._part]
 
     def amount(self, x: Array, v: Array) -> float:
         """Tension or moment."""
@@ -206,6 +219,14 @@ class ElasticElement(ForceElement):
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         mean = self.k.mean(self.coordinate(x)[0], self.coordinate(y)[0])
         return -mean * self.mean_slope(x, y)
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        (q, g), (kinds, y) = self.coordinate(x), self._alone(x)
+        D, n = np.zeros(BLOCK), len(x)
+        add_bends(kinds, y, np.append(g, np.zeros(VECTORS - g.size))[:, None],
+                  np.array([self.k(q)]), D)
+        return -self.k.slope(q, self._scale) * np.multiply.outer(g, g) - D.reshape(
+            2, 2, 2, 2)[:n, :, :n]
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         g = self.coordinate(x)[1]
@@ -247,33 +268,15 @@ class Spring(ElasticElement):
         a, b = (end_of(layout, place) for place in self.between)
         refuse(not a.weights.size and not b.weights.size, "neither end of the spring between {!r} "
                "is a point of a beam or a rigid body: both would be of the ground", self.between)
-        self._link = b - a
-        distance = float(np.hypot(*self._link.start))
+        link = b - a
+        distance = float(np.hypot(*link.start))
         refuse(distance == 0.0 and self.length != 0.0, "the spring between {!r} has length zero, "
                "and so no direction: name two different points, or give length=0 for a spring that "
                "pulls them together", self.between)
-        self._length = self._scale = distance if self.length is None else self.length
-        return [self._link]
-
-    def parts(self) -> list[KernelElement] | None:
-        if isinstance(self.k, Law) or isinstance(self.damping, Law):
-            return None
-        return [KernelElement(SPRING, self._link, Vector(np.zeros(2)),
-                     (self.k, self._length, self.damping, 0.0, 0.0))]
-
-    def coordinate(self, x: Array) -> tuple[float, Array]:
-        length = max(float(np.hypot(*x[0])), TINY)
-        return length - self._length, x / length
-
-    def mean_slope(self, x: Array, y: Array) -> Array:
-        return (x + y) / sum(max(float(np.hypot(*one[0])), TINY) for one in (x, y))
-
-    def stiffness(self, x: Array, v: Array, t: float) -> Array:
-        q, (n,) = self.coordinate(x)
-        along = np.outer(n, n)
-        K = self.k.slope(q, self._length) * along + self.k(q) / (q + self._length) * (
-            np.eye(2) - along)
-        return -K.reshape(1, 2, 1, 2)
+        self._scale = distance if self.length is None else self.length
+        self._part = KernelElement(SPRING, link, Vector(np.zeros(2)),
+                                   (self.k, self.damping, self._scale, 0.0, 0.0))
+        return [link]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         yield Symbol("spring", tuple(end_of(layout, place) for place in self.between),
@@ -319,47 +322,20 @@ class TorsionalSpring(ElasticElement):
                "section is known up to whole turns only. Of a spring wound by more, add the moment "
                "of the turns, 2 pi k each, by scene.moment", self.angle)
 
-    #: The angle at the end of the last step.
-    _last = 0.0
-
     def bind(self, layout: Layout) -> list[Vector]:
-        self._d = section(layout, self.beam, self.at)[1]
-        self._e = Vector(self._d.start) if self.other is None else section(layout, *self.other)[1]
-        d, e = self._d.start, self._e.start
-        self._start = float(np.arctan2(e[0] * d[1] - e[1] * d[0], d @ e)) + self.angle
-        return [self._d, self._e]
-
-    def parts(self) -> list[KernelElement] | None:
-        if isinstance(self.k, Law) or isinstance(self.damping, Law):
-            return None
-        return [KernelElement(TORSION, self._d, self._e, (self.k, self.damping, *self.numbers[2:]))]
+        d = section(layout, self.beam, self.at)[1]
+        e = Vector(d.start) if self.other is None else section(layout, *self.other)[1]
+        x, y = d.start, e.start
+        self._start = a = float(np.arctan2(y[0] * x[1] - y[1] * x[0], x @ y)) + self.angle
+        self._part = KernelElement(TORSION, d, e, (
+            self.k, self.damping, float(np.cos(a)), float(np.sin(a)), 0.0))
+        return [d, e]
 
     @property
     def key(self) -> Array:
         """Numbers that differ for springs on other sections, (n,)."""
-        return np.concatenate([np.ravel(x) for one in (self._d, self._e)
+        return np.concatenate([np.ravel(x) for one in self.links
                                for x in (one.start, one.dofs, one.weights)])
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Parameters of the kernel of angles."""
-        return 0.0, 0.0, float(np.cos(self._start)), float(np.sin(self._start)), 0.0
-
-    def angle_of(self, x: Array) -> float:
-        """The angle for directions d and e, (2, 2), less than half a turn from the last one."""
-        out = np.empty(1)
-        turned(np.array(self.numbers)[:, None], x.reshape(4, 1), np.array([self._last]), out)
-        return float(out[0])
-
-    def coordinate(self, x: Array) -> tuple[float, Array]:
-        g = np.empty((4, 1))
-        turning(np.reshape(x, (4, 1)), g)
-        return self.angle_of(np.asarray(x)), g.reshape(2, 2)
-
-    def mean_slope(self, x: Array, y: Array) -> Array:
-        g = np.empty((4, 1))
-        mean_turning(x.reshape(4, 1), y.reshape(4, 1), g)
-        return g.reshape(2, 2)
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         yield Symbol("torsional spring", (section(layout, self.beam, self.at)[0],),

@@ -16,14 +16,12 @@ from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
 from .inertia import RotatingFrame
-from .kernels import (ALONG_PUSHING, DERIVATIVES, ELASTIC, ENTRIES, NUMBERS, PUSHING, RESISTING,
-                      SETTLED, TORSION, TURNED, ForceTables, element_stiffness, potential,
-                      run_kinds, vectors_of)
+from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
+                      RESISTING, SETTLED, TORSION, TURNED, ForceTables, element_stiffness, kinds_of,
+                      of_kinds, potential, vectors_of)
 from .springs import TorsionalSpring
 
 
-#: Kinds that the kernels know.
-KINDS = 4
 #: Relative size of forces of an item that are round-off.
 SMALL = 1e-6
 #: The derivatives of elements that depend on their first vector.
@@ -113,10 +111,8 @@ class Forces:
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
                                key=lambda e: -1 if e in self.custom else self.rows_of(e)[0])
         self.contacts = Contacts(self.elements, N, len(self._springs))
-        damping = ({0: c, 1: b, 2: b, 3: a or b}[part.kind] for part in self.parts
-                   for a, b, c in [part.numbers[:3]])
         self.resists = (any(e.resists for e in self.custom)
-                        or any(c > 0.0 for c in damping)
+                        or any(any(part.numbers[int(part.kind != DRAG):2]) for part in self.parts)
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
     def _sort(self):
@@ -274,13 +270,14 @@ class Forces:
 
     def part_forces(self, tables: ForceTables, u: Array, v: Array) -> Array:
         """Resisting force on the first vector of each part, shape (2, parts)."""
-        y, w, out = self.vectors(tables, u), np.empty(self.rows), np.zeros(self.rows)
+        n, y, w, out = len(self.parts), self.vectors(tables, u), np.empty(self.rows), np.zeros(
+            (2, self.rows))
         vectors_of(tables, v, 0.0, w)
-        run_kinds(tables, np.int64(ELASTIC), y, y, 0.0, out)
-        resisting = np.zeros(self.rows)
-        run_kinds(tables, np.int64(RESISTING), y, w, 0.0, resisting)
-        n = len(self.parts)
-        return (out + resisting)[:2 * n].reshape(2, n)
+        if n:
+            kinds = kinds_of(tables)
+            of_kinds(kinds, np.int64(ELASTIC), y, y, 0.0, out[0])
+            of_kinds(kinds, np.int64(RESISTING), y, w, 0.0, out[1])
+        return out.sum(axis=0)[:2 * n].reshape(2, n)
 
     def small_part_forces(self, tables: ForceTables, t: float, base: Array, d: Array) -> Array:
         """:meth:`part_forces` of elements on single points at rest, linearised."""
@@ -298,7 +295,7 @@ class Forces:
     def angles(self, u: Array) -> Array:
         """Angles of torsional springs at u, less than half a turn from the last ones; (k,)."""
         self.recall()
-        return np.array([one.angle_of(np.array([link(u) for link in one.links]))
+        return np.array([one.coordinate(np.array([link(u) for link in one.links]))[0]
                          for one in self._springs])
 
     def settle(self, u0: Array, u: Array, t: float) -> float:
@@ -436,7 +433,7 @@ class Forces:
                 out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
                                       - element.force(x, 0.0 * y, t))
             elif what == TURNED and isinstance(element, TorsionalSpring):
-                self.contacts.turns[self._springs.index(element)] = element.angle_of(x)
+                self.contacts.turns[self._springs.index(element)] = element.coordinate(x)[0]
             elif what == SETTLED and remembers:
                 out[0] += element.accept(x, y, b[len(a):][rows].reshape(-1, 2), t)
             elif what == DERIVATIVES and not element.changing:
