@@ -19,7 +19,7 @@ class KernelElement(NamedTuple):
     kind: int
     d: Vector
     e: Vector
-    numbers: tuple[float, ...]
+    numbers: tuple[Any, ...]
 
 
 class ForceElement(BoundForce, Item):
