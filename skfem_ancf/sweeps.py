@@ -137,8 +137,7 @@ def sweep(build: Callable[..., Any],
     """
     require_function("build", build, "of the parameters that returns a scene")
     require_function("measure", measure, "of the scene that returns numbers")
-    refuse(workers is not None and client is not None, "workers and client exclude each other: "
-           "give one of them")
+    refuse(None not in (workers, client), "workers and client exclude each other: give one of them")
     members = _members(parameters)
     try:
         inspect.signature(build).bind(**members[0])
@@ -176,13 +175,11 @@ def _members(parameters):
     """The parameters as a list of dicts with equal names."""
     if isinstance(parameters, Mapping) or hasattr(parameters, "columns"):  # of pandas
         columns = {name: getattr(x, "values", x) for name, x in parameters.items()}
-        for name, x in columns.items():
-            refuse(isinstance(x, str) or not hasattr(x, "__len__") or np.shape(x) == (),
-                   "the parameter {!r} must have one value for each member, got {!r}; what is the "
-                   "same for all belongs into build", name, x)
-        lengths = {name: len(x) for name, x in columns.items()}
-        refuse(len(set(lengths.values())) > 1, "the parameters must have equal lengths, got {}; "
-               "for all combinations hand a list of dicts, made by itertools.product", lengths)
+        for name, x in columns.items():  # a text has no shape
+            refuse(np.shape(x) == (), "the parameter {!r} must have one value for each member, got "
+                   "{!r}: what is the same for all belongs into build", name, x)
+        refuse(len({*map(len, columns.values())}) > 1, "the parameters must have equal lengths, as "
+               "from itertools.product, got {!r}", columns)
         parameters = [dict(zip(columns, row)) for row in zip(*columns.values())]
     refuse(isinstance(parameters, str) or not hasattr(parameters, "__iter__"), "parameters must be "
            "a dict of arrays or a list of dicts, got {!r}", parameters)
@@ -190,8 +187,7 @@ def _members(parameters):
     refuse(not members, "there are no members in the parameters")
     for k, member in enumerate(members):
         refuse(not isinstance(member, Mapping) or set(member) != set(members[0]), "parameters must "
-               "be a dict of arrays, or a list of dicts with equal names; the first has {!r}, "
-               "number {} is {!r}", members[0], k, member)
+               "have equal names: the first has {!r}, number {} is {!r}", members[0], k, member)
     return members
 
 
@@ -201,11 +197,11 @@ def _measured(build, measure, member):
         value = measure(build(**member))
         found = value if isinstance(value, dict) else {"value": value}
         for name, x in found.items():
-            if not isinstance(name, str) or np.asarray(x).dtype.kind not in "biufc":
-                raise CallbackError("measure must return a number, an array of numbers, or a dict "
-                                    f"of them by name, got {shown(value)}")
-            refuse(name in member, "measure calls a value {!r}, which is a parameter of build: "
-                   "give it another name", name, error=CallbackError)
+            refuse(not isinstance(name, str) or np.asarray(x).dtype.kind not in "biufc", "measure "
+                   "must return a number, an array of numbers, or a dict of them by name, got {!r}",
+                   value, error=CallbackError)
+            refuse(name in member, "measure calls a value {!r} as a parameter of build: give it "
+                   "another name", name, error=CallbackError)
         return {name: np.array(x) * 1.0 for name, x in found.items()}
     except Exception as error:
         return f"{type(error).__name__}: {error}"
@@ -218,14 +214,13 @@ def _in_order(submit, task, members, most, lost=None):
     try:
         for k in range(len(members) + most):
             if k >= most:
-                first, future = k - most, flying.popleft()
                 try:
-                    yield first, future.result()
+                    yield k - most, flying.popleft().result()
                 except Exception as error:
                     if lost is not None and isinstance(error, BrokenExecutor):
-                        lost.append(first)
+                        lost.append(k - most)
                     else:
-                        yield first, f"{type(error).__name__}: {error}"
+                        yield k - most, f"{type(error).__name__}: {error}"
             if k < len(members):
                 flying.append(submit(task, members[k]))
     finally:
@@ -244,8 +239,7 @@ def _in_processes(task, members, workers):
     except Exception as error:  # pickling may raise anything
         raise PickleError(f"build, {shown(task.args[0])}, or measure, {shown(task.args[1])}, "
                           f"cannot be sent to another process: {error}. Define them by def at the "
-                          "top of a module, leave workers out, or hand a client of "
-                          "dask.distributed, which sends any function by cloudpickle") from None
+                          "top of a module, or leave workers out") from None
     names = [name for name in _THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(names, "1"))  # for the processes that are started
     start = partial(ProcessPoolExecutor, workers, multiprocessing.get_context("spawn"),
@@ -267,7 +261,7 @@ def _in_processes(task, members, workers):
             yield k, next(_in_order(submit, task, members[k:k + 1], 1))[1]
     except BrokenExecutor as error:
         raise CallError("processes cannot be started: in a script, call sweep under if __name__ == "
-                        "'__main__':, since each of them imports the script") from error
+                        "'__main__':") from error
     finally:
         pool.shutdown(cancel_futures=True)
         for name in names:

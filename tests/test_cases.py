@@ -119,8 +119,8 @@ def test_the_scene_is_not_changed_and_large_displacements_do_not_superpose():
 
 def test_wrong_cases_teach():
     scene = girder()
-    for cases, match in (({"a": 3.0}, "must be a function"), ({"a": lambda s: s}, "adds none"),
-                         ({"a": lambda s: s.spring(1.0, ((3, 0), (3, -1)))}, "belong to the scene"),
+    for cases, match in (({"a": 3.0}, "must be a function"), ({"a": lambda s: s}, "and adds none"),
+                         ({"a": lambda s: s.spring(1.0, ((3, 0), (3, -1)))}, "loads, and adds"),
                          ({}, "no load case")):
         with pytest.raises(InputError, match=match):
             LoadCases(scene, cases)

@@ -128,7 +128,7 @@ def test_wrong_fields():
             call(lambda v: "text")
         with pytest.raises(CallbackError, match="raised KeyError"):
             call(lambda v: {}["no"])
-    with pytest.raises(InputError, match="has 3 components, a plot shows one"):
+    with pytest.raises(InputError, match="a plot shows a field of one component, as"):
         state.plot("stress")
     with pytest.raises(InputError, match="different names"):
         find_fields(["eps_xx", "eps_xx"])

@@ -684,8 +684,8 @@ def test_what_cannot_be_is_said():
     with pytest.raises(InputError, match="constant E in its other layers"):
         _ = Beam(line, ElementBeamCable(3), section=Section.layers(
             (0.05, graded), (0.05, steel), width=B)).kernel
-    for wrong, text in ((dict(yield_stress=-1.0), "positive"), (dict(hardening=-1.0), "softening"),
-                        (dict(hardening=[[0.0, 1e8], [1.0, 2e8]]), "begins with the yield stress"),
+    for wrong, text in ((dict(yield_stress=-1.0), "positive"), (dict(hardening=-1.0), "zero or"),
+                        (dict(hardening=[[0.0, 1e8], [1.0, 2e8]]), "yield_stress = "),
                         (dict(kinematic=-1.0), "kinematic"), (dict(points=1), "points")):
         with pytest.raises(InputError, match=text):
             ElasticPlastic(**{"E": E, "nu": NU, "yield_stress": YIELD, **wrong})

@@ -191,7 +191,7 @@ def test_derivatives_of_laws(law, message):
 
 def test_coordinates_of_elements_are_counted():
     for names, functionals in ((["r_Y", "x"], [(0.0, 0, 1)]), (["r_Y", "x"], 2 * [(0.0, 0, 1)])):
-        with pytest.raises(InputError, match="section functions"):
+        with pytest.raises(InputError, match="across the section, which has"):
             ElementBeam(SectionFunctions([[1.0]]), names, functionals, ["r_Y"])
     with pytest.raises(InputError, match="derivatives"):
         SectionFunctions([[1.0], [0.0, 1.0]])

@@ -225,7 +225,7 @@ def test_domains_alone_are_reported_and_checked(tmp_path):
     page = Page(state.report(tmp_path / "strip.html"))
     assert page.row("largest displacement")[1:] == ["0.2025", "(2, 1)", "0"]
     assert sum("times the strength" in text for text in page.text["p"]) == 1
-    with pytest.raises(InputError, match=r"those of beams, .*extremes\(.von_mises.\)"):
+    with pytest.raises(InputError, match=r"those of beams: .*plot\(.von_mises.\)"):
         state.plot_resultants()
 
 

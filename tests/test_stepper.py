@@ -138,5 +138,5 @@ def test_what_a_stepper_refuses():
     stepper.step([1.0])
     sampled = scene_of()
     sampled.add(Control(lambda t: (0.0, 0.0), at=(1, 0), dt=0.01))
-    with pytest.raises(InputError, match="sampled by its caller"):
+    with pytest.raises(InputError, match="leave out dt= of"):
         sampled.stepper(DT)

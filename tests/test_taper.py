@@ -199,7 +199,7 @@ def test_bad_heights(height, kind, words):
 
 
 @pytest.mark.parametrize("width, words", [
-    (lambda x, y: 0.1 - 0.2 * x, "positive all over the body"),
+    (lambda x, y: 0.1 - 0.2 * x, "y. must be positive"),
     (lambda x, y: np.full(x.shape, np.nan), "finite"),
     (lambda x: x, "width"), (0.0, "positive"), (None, "give width="),
 ])

@@ -89,7 +89,7 @@ def require_degree(degree: object) -> int:
     if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
             or degree not in DEGREES):
         raise InputError(f"the degree along the axis is one of {', '.join(map(str, DEGREES))}, got "
-                         f"{shown(degree)}: half of the Hermite functions belong to each node")
+                         f"{shown(degree)}")
     return int(degree)
 
 
@@ -183,8 +183,7 @@ class ElementBeam(Immutable, Element):
                        1 + max([a for _, a, across in self.functionals if across > 0], default=0))
         across, expected = len(self.functionals) - self._along[0], section.number * self._along[1]
         refuse(len(names) != len(functionals) or across != expected, "{} has {} names and {} "
-               "functionals, {} of them across the section: each name is one, and of each of the "
-               "{} section functions there is one for each derivative along X, here {}",
+               "functionals, {} of them across the section, which has {} functions and needs {}",
                type(self).__name__, len(names), len(functionals), across, section.number, expected)
         self.axis_degree = 2 * self._along[0] - 1
         self.sections = SECTIONS[self._along[1] - 1]
@@ -422,8 +421,8 @@ class ElementBeam(Immutable, Element):
         if mesh.is_straight:
             return mesh
         refuse(self.section.number and self.axis_degree > 3 and self._along[0] != self._along[1],
-               "{!r} is for straight meshes: axis and sections of a curved one are of one degree. "
-               "Use ElementBeamANCF or ElementBeamANCFHermite", self, error=MeshError)
+               "{!r} is for straight meshes: use ElementBeamANCF or ElementBeamANCFHermite", self,
+               error=MeshError)
         return mesh.with_sections(self.mesh_sections)
 
     @property

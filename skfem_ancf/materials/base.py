@@ -181,16 +181,15 @@ class Material(Immutable):
         """The law with corrected shear, as a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)
         self._require_number()
-        refuse(not self._fits("stress", "energy"), "{} overrides energy and not stress, with which "
-               "beams are solved: define stress(strain), its derivative, too", type(self).__name__)
+        refuse(not self._fits("stress", "energy"), "{} overrides energy and not stress(strain), "
+               "its derivative", type(self).__name__)
         law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
         if not is_builtin(self):
             _require_derivatives(law, self)
         return law if k_s == 1.0 else ShearCorrected(law, k_s)
 
     def _require_number(self):
-        refuse(callable(self.E), "the modulus E of {!r} is a function of material coordinates, "
-               "which need a Beam. Use replace(E=number)", self)
+        refuse(callable(self.E), "the modulus E of {!r} varies: use replace(E=number)", self)
 
     def _fits(self, name, other="stress"):
         """False if a subclass of the class that defines ``name`` overrides ``other``."""
@@ -242,18 +241,16 @@ class Material(Immutable):
         """Stretch out of the plane, shape (...): 1 in plane strain. Needed for Cauchy stress."""
         if self.plane == "strain":
             return np.ones(np.shape(strain)[1:])
-        raise InputError(
-            f"{type(self).__name__} does not define thickness_stretch(strain), the stretch out of "
-            "the plane that makes S_33 zero in plane stress")
+        raise InputError(f"{type(self).__name__} does not define thickness_stretch(strain), the "
+                         "stretch out of the plane in plane stress")
 
     def stress_zz(self, strain: Array) -> Array:
         """Second Piola-Kirchhoff stress normal to the plane, shape (...): 0 in plane stress. Needed
         for von Mises and Tresca stress in plane strain."""
         if self.plane == "stress":
             return np.zeros(np.shape(strain)[1:])
-        raise InputError(
-            f"{type(self).__name__} does not define stress_zz(strain), the stress normal to the "
-            "plane in plane strain, which von Mises and Tresca stress need")
+        raise InputError(f"{type(self).__name__} does not define stress_zz(strain), the stress "
+                         "normal to the plane in plane strain")
 
     def __repr__(self):
         E = shown(self.E) if callable(self.E) else f"{self.E:g}"

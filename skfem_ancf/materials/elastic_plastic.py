@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import (Array, ArrayLike, refuse, require_finite, require_finite_scalar,
-                    require_not_negative, require_positive)
+from ..core import (Array, ArrayLike, refuse, require_finite, require_not_negative,
+                    require_positive)
 from .history import ACROSS, HistoryMaterial
 
 #: Newton corrections of a return to the yield surface; the gap at the end over the yield stress, or
@@ -113,18 +113,14 @@ class ElasticPlastic(HistoryMaterial):
                 require_not_negative(f"{name} of hardening", value)
             return hardening
         if np.ndim(hardening) == 0:
-            value = require_finite_scalar("hardening", hardening)
-            refuse(value < 0.0, "hardening must not be negative, got {:g}: softening, for which "
-                   "the result would depend on the mesh, is not included", value)
-            return value
+            return require_not_negative("hardening", hardening, False)
         table = require_finite("hardening", hardening, (None, 2))
         rise = np.diff(table, axis=0)
         refuse(len(table) < 2 or table[0, 0] != 0.0 or np.any(rise[:, 0] <= 0.0) or np.any(
-            rise[:, 1] < 0.0), "hardening as a table has rows (plastic strain, yield stress), the "
-            "strains increasing from 0 and the stresses not decreasing; got {!r}", table)
-        refuse(abs(table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress, "the table of "
-               "hardening begins with the yield stress {:g}, and yield_stress is {:g}", table[0, 1],
-               self.yield_stress)
+            rise[:, 1] < 0.0) or abs(table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress,
+            "hardening as a table has rows (plastic strain, yield stress), strains increasing from "
+            "0, stresses not decreasing from yield_stress = {:g}; got {!r}", self.yield_stress,
+            table)
         return table
 
     def __repr__(self) -> str:

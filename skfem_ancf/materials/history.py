@@ -88,8 +88,8 @@ class HistoryMaterial(Material):
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
                  points: int = ACROSS,
                  strength: float | tuple[float, float] | None = None) -> None:
-        refuse(callable(E), "{} has a history, and takes a number for E: give layers of other "
-               "materials by Section.layers", type(self).__name__)
+        refuse(callable(E), "{} has a history and takes a number for E: use Section.layers",
+               type(self).__name__)
         super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, strength)
         self.points = require_integer("points", points, 2, 200)
 
@@ -220,10 +220,9 @@ class HistoryMaterial(Material):
             E, d = np.array([[1.3], [-0.7], [0.9]]), np.array([[0.3], [0.7], [-0.6]])
             E, d, zero = SMALL * E, 1e-4 * SMALL * d, np.zeros((self.number, 1))
             S, after = self.stress(E, zero, SOON)
-            refuse(np.shape(S) != E.shape or np.shape(after) != zero.shape, "stress(strain, "
-                   "history, dt) of {} must return arrays of the shapes of strain and history, "
-                   "{} and {}, got {} and {}", type(self).__name__, E.shape, zero.shape,
-                   np.shape(S), np.shape(after))
+            refuse(np.shape(S) != E.shape or np.shape(after) != zero.shape, "stress of {} must "
+                   "return the shapes of strain and history, {} and {}, got {} and {}",
+                   type(self).__name__, E.shape, zero.shape, np.shape(S), np.shape(after))
             D = self.moduli(E, zero, SOON)
             require_slope(f"moduli(strain, history, dt) of {type(self).__name__}",
                           "stress(strain, history, dt)",

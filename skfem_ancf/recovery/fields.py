@@ -16,8 +16,8 @@ from ..beam import (Beam, BeamPoints, Domain, by_history, displacement_strain, g
                     remembers)
 from ..beam.strains import stress_at, stretched
 from ..core import (Array, CallbackError, InputError, NameUnknown, ask, first_order, refuse,
-                    require_finite_scalar, require_flag, require_integer, require_label,
-                    require_text, retold, shown, step, stress_of)
+                    require_finite_scalar, require_flag, require_function, require_integer,
+                    require_label, require_text, retold, shown, step, stress_of)
 from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from .recovered import Recovery
@@ -70,8 +70,7 @@ class Field:
     def __post_init__(self) -> None:
         if require_label("the name of a field", self.name) is None:
             raise InputError(f"the name of a field must be a text, got {shown(self.name)}")
-        refuse(not callable(self.function), "the function of a field takes Values and returns an "
-               "array, got {!r}", self.function)
+        require_function("the function of a field", self.function, "of Values")
         require_integer("components", self.components, 1, 3)
         for name in ("title", "unit", "frame"):
             if require_text(name, getattr(self, name)) is None:
@@ -513,8 +512,8 @@ def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, .
         known = tuple(FIELDS) if known is None else known
         if field not in known:
             if field in FIELDS:
-                raise InputError(f"the field {field!r} has {FIELDS[field].components} components, "
-                                 f"a plot shows one, as {', '.join(map(repr, known[:4]))}")
+                raise InputError(f"a plot shows a field of one component, as "
+                                 f"{', '.join(map(repr, known[:4]))}, got {field!r}")
             raise NameUnknown("field", field, known)
         return FIELDS[field]
     if callable(field) and not isinstance(field, type):

@@ -134,8 +134,8 @@ def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
 def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
     """Points of an element's Lagrange cell, and their VTK order."""
     p = max(min(beam.element.axis_degree, MAX_LAGRANGE_DEGREE), beam.element.order)
-    refuse(p > MAX_LAGRANGE_DEGREE, "VTK evaluates Lagrange cells up to degree {}, this element "
-           "has {}: use subdivide= instead of lagrange=True", MAX_LAGRANGE_DEGREE, p)
+    refuse(p > MAX_LAGRANGE_DEGREE, "VTK has Lagrange cells up to degree {}, this element has {}: "
+           "use subdivide=", MAX_LAGRANGE_DEGREE, p)
     k = np.arange((p + 1) ** 2).reshape(p + 1, p + 1)  # [xi, eta]
     inner = slice(1, -1)
     # corners, edges in the direction of increasing xi and eta, the interior with xi fastest

@@ -503,10 +503,8 @@ class SectionForces:
         jump = (np.abs(R).max(axis=-1) * mesh.height + np.abs(M)) / size
         jump[np.isin(place, self._acted)] = 0.0
         if jump.max() > (UNBALANCED if self._acceleration is None else UNBALANCED_MOTION):
-            raise NotRecovered(
-                "the state is not an equilibrium under the loads of the scene: at node "
-                f"{jump.argmax()} the section force jumps by {jump.max():.1%} of its largest "
-                "value")
+            raise NotRecovered("the state is not an equilibrium: at node "
+                               f"{jump.argmax()} the section force jumps by {jump.max():.1%}")
 
 
 class Together:

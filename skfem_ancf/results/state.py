@@ -660,8 +660,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
         sections = require_integer("sections", sections, 2, 10000)
         if at is not None:
             found = self.system.points.find(at, beam, line, ask=True)
-            refuse(len(found.parts) != 1, "the points are in several beams: ask for the resultants "
-                   "of each, with beam=")
+            refuse(len(found.parts) != 1, "points are in several beams: choose one with beam=")
             part, one = found.parts[0], found.one
             k, places = part.number, (part.e, part.X[0])
         else:

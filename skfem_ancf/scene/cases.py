@@ -10,8 +10,8 @@ import numpy as np
 
 from ..actions.loads import Load
 from ..beam import WhichBeam, select_beam
-from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar, require_like,
-                    require_option)
+from ..core import (AncfError, Array, InputError, refuse, require_finite_scalar,
+                    require_function, require_like, require_option, shown)
 from ..results.output import supports_of
 from ..results.state import State
 from .scene import Scene
@@ -90,16 +90,15 @@ class LoadCases(Mapping):
         self.scene, self.linear = scene, linear
         self.cases = {}
         for name, add in dict(cases).items():
-            refuse(not callable(add), "load case {!r} must be a function that adds loads to a "
-                   "scene, as lambda scene: scene.line_load((0, -1e3)), got {!r}", name, add)
+            require_function(f"load case {name!r}", add, "that adds loads to a scene, as lambda "
+                             "scene: scene.line_load((0, -1e3))")
             other = copy(scene)
             add(other)
             self.cases[name] = entries = other._entries[len(scene._entries):]
             extra = [one for entry in entries for one in entry.bound if not isinstance(one, Load)]
             if extra or not entries or other._fixed != scene._fixed:
-                raise InputError(f"load case {name!r} must add loads, " + (
-                    f"and adds {extra[0]!r}" if extra else "and adds none") + ": supports, joints "
-                    "and springs belong to the scene")
+                raise InputError(f"load case {name!r} must add loads, and adds "
+                                 f"{shown(extra[0]) if extra else 'none'}")
         if combinations is None:
             combinations = {name: {name: 1.0} for name in self.cases}
         self.combinations = {}
@@ -110,8 +109,7 @@ class LoadCases(Mapping):
                 require_option("load case", case, self.cases)
             self.combinations[name] = {case: require_finite_scalar(f"factor of {case!r}", factor)
                                        for case, factor in factors.items()}
-        refuse(not self.combinations, "there is no load case: give functions by name, as {'snow': "
-               "lambda scene: scene.line_load((0, -1e3))}")
+        refuse(not self.combinations, "there is no load case")
         self._states: dict[str, State] = {}
 
     def factored(self, name: str) -> Scene:

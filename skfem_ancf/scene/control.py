@@ -96,15 +96,12 @@ class LinearModel:
         self.state, self._system = state, system
         self.matrices = matrices_of(system, state)
         self._free = system.constraints.free
-        refuse(np.any(state.v), "a linear model is about a state at rest, and this one moves: use "
-               "the equilibrium, of a steady rotation in a RotatingFrame")
+        refuse(np.any(state.v), "a linear model is about a state at rest, and this one moves")
         if relaxing := system.histories.relaxing():
             warn(f"a linear model has the stiffness at once of {relaxing[0]!r}, which relaxes in "
-                 "time: it is right where all is fast beside that. A motion has all of it, by "
-                 "integrate(...) with a load of the frequency in question", ModelWarning)
+                 "time: integrate(...) has all of it", ModelWarning)
         refuse(not inputs or not sensors, "a linear model has inputs, as [PointForce((0, 1), at="
-               "(1, 0))], and outputs, as scene.sensor('tip', 'displacement', at=(1, 0)), got {} "
-               "and {}", [name for name, *_ in inputs], [name for name, _ in sensors])
+               "(1, 0))], and outputs, as scene.sensor('tip', 'displacement', at=(1, 0))")
         columns = [(name, _columns(system, state, *item)) for name, *item in inputs]
         self.inputs = [label for name, c in columns for label in _labels(name, len(c))]
         self.B, self.G, self.prescribed = (
@@ -134,8 +131,8 @@ class LinearModel:
             the assembled stiffness has the round-off of (L / h)^2.
         """
         if np.any(self.readings.multipliers):
-            raise InputError("joints are eliminated from a state space, and an output is the force "
-                             "of a joint: use frequency_response(), or the force of a stiff spring")
+            raise InputError("an output is the force of a joint, which a state space eliminates: "
+                             "use frequency_response()")
         system, (_, D, K, _, J) = self._system, self.matrices
         # the basis (N, n) of all motions that joints allow, or of the lowest modes
         if modes is None:
@@ -145,8 +142,7 @@ class LinearModel:
         else:
             found = eigen.modes(system, self.state, require_integer("modes", modes, 1))
             T = found.shapes.T
-            refuse(np.iscomplexobj(T), "the loads have no potential, and modes are complex: use "
-                   "state_space() without modes")
+            refuse(np.iscomplexobj(T), "modes are complex: use state_space() without modes")
             M, D = np.eye(T.shape[1]), T.T @ (D @ T)
             K = np.diag(found.eigenvalues.real) if system.symmetric else T.T @ (K @ T)
         n, inertia, U = len(M), scipy.linalg.cho_factor(M), np.zeros_like(self.B)
@@ -164,9 +160,8 @@ class LinearModel:
         u, v, a, _ = self.readings
         moved = U - T @ shift
         refuse(np.any(np.abs((v + a) @ moved) + np.abs(a @ T @ rate) > DIRECT * np.abs(
-                    v + a) @ np.abs(U)), "the velocity or acceleration of an output depends on the "
-               "rate of a prescribed motion, which is no input: read displacements, or use "
-               "frequency_response()")
+            v + a) @ np.abs(U)), "an output depends on the rate of a prescribed motion: read "
+               "displacements, or use frequency_response()")
         C = np.hstack([u @ T, v @ T]) + a @ T @ lower
         through = a @ T @ force + u @ moved + v @ T @ rate
         if modes is not None:  # static displacements of unit inputs without those of modes
@@ -401,8 +396,7 @@ class Stepper:
         """The equations, and what takes steps of them."""
         self._system = s = self.scene.system
         if s.forces.sampled:
-            raise InputError(f"{s.forces.sampled[0]!r} samples by itself, and a stepper is sampled "
-                             "by its caller: leave out dt= of the Control")
+            raise InputError(f"leave out dt= of {s.forces.sampled[0]!r}: a stepper samples it")
         self._integrator, self._turns = integrator_of(s, self._scheme), Turns(s)
         self._integrator.longest = 1
         self._sensors = [(name, sensor, locate(sensor, s))

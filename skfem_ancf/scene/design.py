@@ -309,9 +309,7 @@ class Design:
         # An eigenvalue has rows whose sum it is.
         scene = self._scene(p)
         system, old = scene.system, self._built.system
-        refuse(system.N != old.N or system.constraints.m != old.constraints.m, "the parameters "
-               "change the number of degrees of freedom or of joint equations, from {} and {} to "
-               "{} and {}", old.N, old.constraints.m, system.N, system.constraints.m)
+        require_same_size(system, old.N, old.constraints.m)
         parts, seen = [np.zeros(0)], self._values
         if state is not None:
             u, l = np.array(state.u), state.multipliers
@@ -319,6 +317,12 @@ class Design:
             seen = self._read(scene, State(system, u, state.load, multipliers=l,
                                            memory=state.memory))
         return np.concatenate([*parts, seen, *(frozen.rows(scene) for frozen in self._frozen)])
+
+
+def require_same_size(system: Any, N: int, m: int) -> None:
+    """Raise InputError for other numbers of degrees of freedom or of joint equations."""
+    refuse((system.N, system.constraints.m) != (N, m), "the parameters change the number of "
+           "degrees of freedom or of joint equations")
 
 
 class Differences:
@@ -390,8 +394,7 @@ class Gradient(Design):
     def __init__(self, scene: Any, state: State, wrt: Sequence[Any],
                  readings: Sequence[Any] = ()) -> None:
         refuse(state.t is not None or state.base is not None, "derivatives are of static "
-               "solutions, and this state is {}",
-               "linear" if state.t is None else "an instant of a motion")
+               "solutions, got {!r}", state)
         self.build: Parameters = Parameters(scene, wrt)
         super().__init__(self.build, readings)
         self._begin(self.build.start, scene, state)
@@ -417,7 +420,7 @@ class Gradient(Design):
 def require_smooth(state: State) -> None:
     """Raise InputError if forces depend on the path."""
     refuse(state.system.histories.dissipates, "forces of this scene depend on the path (friction, "
-           "plasticity): the derivative of a reading depends on the direction, and is not defined")
+           "plasticity): derivatives are not defined")
 
 
 def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
@@ -446,9 +449,8 @@ def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
             y = kernel.gather(y).reshape(len(B), -1, 1)
             resists += np.vdot(B @ y, HB @ y)
     if abs(soft @ force) < SNAP * resists:
-        raise InputError(f"this state snaps or branches: in one shape it has {soft @ force:.1g} of "
-                         f"the stiffness of its material, {resists:.1g}, so that derivatives have "
-                         "no bounds. Take another load, or CriticalLoad() as reading")
+        raise InputError(f"this state snaps or branches: one shape has a stiffness of only "
+                         f"{soft @ force / resists:.1g} of its material; read CriticalLoad()")
     if system.forces.contacts.groups:
         _require_pressed(system, u, state.load, soft)
     return found[:-1]
@@ -465,8 +467,7 @@ def _require_pressed(system, u, load, soft):
         moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))
         at = (np.abs(gap) < TOUCH * group.height) & (np.hypot(*push) <= TOUCH * largest) & (
             moves > HELD * moves.max())
-        refuse_any(at, "a point just touches an obstacle, at {:.6g}: the derivative depends on "
-                   "whether a change lifts or presses it. Take another load or place", x)
+        refuse_any(at, "a point just touches an obstacle, at {:.6g}: take another load", x)
 
 
 def tangent_of(state: State, P: Any) -> Bordered:
@@ -550,11 +551,9 @@ class EigenReading:
         for other in (self.number - 1, self.number + 1):
             if 0 <= other < len(values) and abs(values[other] - own) <= SIMPLE * abs(own):
                 raise InputError(
-                    f"{self!r} is not simple: numbers {min(other, self.number)} and "
-                    f"{max(other, self.number)} are equal to {abs(values[other] / own - 1):.1g}. "
-                    "A multiple eigenvalue has no derivative, as its shapes depend on the "
-                    "direction: use a smooth function, as the sum of both, of differences, or "
-                    "break the symmetry")
+                    f"{self!r} is not simple, and has no derivative: numbers "
+                    f"{min(other, self.number)} and {max(other, self.number)} are equal to "
+                    f"{abs(values[other] / own - 1):.1g}")
 
 
 class Frequency(EigenReading):
@@ -597,8 +596,8 @@ class Frequency(EigenReading):
     def _freeze(self, scene: Any, found: Any) -> Frozen:
         values, system, state = found.eigenvalues, scene.system, found.state
         mu, omega = values[self.number].real, found.frequencies[self.number].real
-        refuse(found.flutter or not system.symmetric, "the loads have no potential: derivatives of "
-               "frequencies need a symmetric stiffness, so use differences of values")
+        refuse(found.flutter or not system.symmetric, "the loads have no potential: use "
+               "differences of values")
         if abs(mu) <= 1e2 * eigen.ROUND_OFF**2 * system.scales.bending_eigenvalue:
             raise InputError(f"{self!r} is that of a rigid motion, zero for all parameters: give "
                              "a higher number, or supports")
@@ -685,8 +684,8 @@ class CriticalLoad(EigenReading):
 
     def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
         points = scene.continuation(**self.options).critical_points
-        refuse(len(points) <= self.number, "{!r} does not exist: the path has {} critical points. "
-               "Follow it further, by steps= or max_load=", self, len(points))
+        refuse(len(points) <= self.number, "{!r} does not exist: the path has {} critical points; "
+               "give steps= or max_load=", self, len(points))
         return float(points[self.number].load), points[self.number]
 
     def _freeze(self, scene: Any, found: Any) -> Frozen:
@@ -724,10 +723,8 @@ class CriticalLoad(EigenReading):
 
 def _require_symmetry(work):
     if np.any(np.abs(work) > SYMMETRIC):
-        k = int(np.argmax(np.abs(work)))
-        raise InputError(f"parameter {k} disturbs the symmetry of the bifurcation, which becomes a "
-                         "limit point below it: the critical load has no derivative, it falls as "
-                         "the power 2/3 of the disturbance. Start from a disturbed structure")
+        raise InputError(f"parameter {np.argmax(np.abs(work))} disturbs the symmetry of the "
+                         "bifurcation: the critical load has no derivative")
 
 
 class _Quadratic:

@@ -486,8 +486,7 @@ class Frame(Scene):
         for old, new in zip(self.beams, beams):
             a, b = (beam.mesh.p[:, chain_ends(beam)] for beam in (old, new))
             refuse(a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.graph.size, "{!r} "
-                   "must have a chain for each line of {!r}, from the same point to the same "
-                   "point: nodes between them may be others", new, old)
+                   "must have the lines of {!r} between the same points", new, old)
         frame = type(self)(self.graph, beams, self._lines, self._hinged)
         frame._take(self._entries[0].given)
         return frame
@@ -504,9 +503,8 @@ def _heights(height, lines):
         return height
     if not isinstance(height, (list, tuple)) and np.ndim(height) != 1:
         return require_finite_scalar("height", height)
-    refuse(len(height) != len(lines), "height has {} entries for {} line(s): give a number, a "
-           "function of s from 0 to 1 along each line, or a list with one of these for each line; "
-           "one given in sections for each of the group", len(height), len(lines))
+    refuse(len(height) != len(lines), "height has {} entries for {} line(s): give one for each, or "
+           "a number or a function of s from 0 to 1 for all", len(height), len(lines))
     return [one if callable(one) else require_positive(f"height of line {k}", one)
             for k, one in zip(lines, height)]
 
@@ -519,17 +517,16 @@ def _hinged(graph, hinges):
         return ~out
     if isinstance(hinges, (str, int, np.integer)):
         hinges = [hinges]
-    refuse(not isinstance(hinges, (list, tuple, set, frozenset)) and not (
-                isinstance(hinges, np.ndarray) and hinges.ndim), 'hinges are "all", or a list of '
-           'nodes and of pairs (line, node), got {!r}', hinges)
+    refuse(not isinstance(hinges, (list, tuple, set, frozenset)) and not np.ndim(hinges), 'hinges '
+           'are "all", or a list of nodes and of pairs (line, node), got {!r}', hinges)
     for one in hinges:
         if isinstance(one, (tuple, list, np.ndarray)) and len(one) == 2:
             line, node = (int(graph.lines_of(one[0])[0]), int(graph.points_at(one[1])[0]))
             at = lines[:, line] == node
             refuse(not np.any(at), "line {} does not end at node {}: it joins {}", line, node,
                    lines[:, line].tolist())
-            refuse(line not in graph.distinct, "line {} cannot be hinged: its ends are one node, "
-                   "as they are not farther apart than tol = {:.3g}", line, graph.tol)
+            refuse(line not in graph.distinct, "line {} cannot be hinged: its ends are one node "
+                   "within tol = {:.3g}", line, graph.tol)
             out[at, line] = True
         else:
             out |= np.isin(lines, graph.points_at(one))

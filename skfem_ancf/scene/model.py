@@ -222,9 +222,8 @@ class Model(NearMisses):
         >>> ax = state.plot("S_xx")                                 # $S_{xx}$ (MPa)
         """
         for name, value in (("force", force), ("length", length)):
-            refuse(not require_text(name, value) or value in OTHER[name], '{} must be the name of '
-                   'a unit of {}, got {!r}: the order is units(force, length), as units("N", "mm")',
-                   name, name, value)
+            refuse(not require_text(name, value) or value in OTHER[name], "{} must be the name of "
+                   "its unit, got {!r}: the order is units(force, length)", name, value)
         self._units = (force, length)
         return self
 

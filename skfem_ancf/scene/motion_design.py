@@ -24,7 +24,7 @@ from ..dynamics.run import integrator_of
 from ..dynamics.sensors import locate, read
 from ..equations.matrices import matrices_of
 from .control import Factors, rows_of
-from .design import STENCIL, Design, Differences, residual
+from .design import STENCIL, Design, Differences, require_same_size, residual
 from .parameters import Parameters
 
 #: Step of the parameters, relative to their size: what it moves of the motion must be small.
@@ -115,10 +115,9 @@ class MotionDesign(Design):
         self.every = require_integer("every", every, 1)
         self.t_end, self.dt = require_positive("t_end", t_end), require_positive("dt", dt)
         self.scheme, self.static = get_scheme(scheme), require_flag("static", static)
-        refuse(not (isinstance(self.scheme, GeneralizedAlpha)
-                    or self.scheme.conserving and in_steps(self.scheme)), "derivatives of a motion "
-               "need one equation for each step: the scheme 'generalized-alpha', 'hht', 'newmark' "
-               "or 'energy-momentum', without stages or parts of a step; got {!r}", self.scheme)
+        refuse(not (isinstance(self.scheme, GeneralizedAlpha) or self.scheme.conserving
+                    and in_steps(self.scheme)), "derivatives of a motion need 'generalized-alpha', "
+               "'hht', 'newmark' or 'energy-momentum', got {!r}", self.scheme)
         self.history: Any = None
         self._static = self.static
 
@@ -126,8 +125,8 @@ class MotionDesign(Design):
         """Integrate at p."""
         system = scene.system
         refuse(system.histories.values.size or system.forces.contacts.obstacles or (
-                    system.forces.changing), "derivatives of a motion are of smooth forces without "
-               "a history: this scene has contact, friction or a material with a history")
+            system.forces.changing), "derivatives of a motion are of smooth forces, without "
+            "contact, friction or a material with a history")
         own = [joint for joint in system.constraints.joints if self.scheme.conserving and (
             type(joint).mean_entries is not BoundConstraint.mean_entries)]
         refuse(own, "{[0]!r} has a Jacobian of its own in steps that conserve energy, without "
@@ -277,8 +276,7 @@ class _Step:
 
     def _same(self, system):
         """A system with other parameters, and its constraints."""
-        refuse((system.N, system.constraints.m) != (len(self.y.u), len(self.y.multipliers)),
-               "the parameters change the number of degrees of freedom or of joint equations")
+        require_same_size(system, len(self.y.u), len(self.y.multipliers))
         return system, system.constraints
 
     def equations(self, scene: Any) -> Array:

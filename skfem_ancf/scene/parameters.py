@@ -90,9 +90,8 @@ class Parameters:
     def __init__(self, scene: Any, wrt: Sequence[Any]) -> None:
         self._scene, self.each, n = scene, [], 0
         for one in wrt:
-            refuse(not isinstance(one, tuple) or len(one) not in (2, 3), "wrt must be a list of "
-                   '(object, name), or of (beam, name, "nodes"), as [(beam, "height")], got {!r}',
-                   one)
+            refuse(not isinstance(one, tuple) or len(one) not in (2, 3), 'wrt must be a list, as '
+                   '[(beam, "height")] or [(beam, "height", "nodes")], got {!r}', one)
             owner, name, field = (*one, "")[:3]
             sizes = 0.0
             if callable(field):
@@ -113,8 +112,7 @@ class Parameters:
             getattr(one, name).ravel() for one in self.each)]) for name in ("start", "sizes"))
         for one in self.each:
             refuse(not _has([*scene.beams, *scene.bodies, *scene.items], one.owner),
-                   "{!r} is no part of the scene: take beams, bodies and items of scene.beams, "
-                   "scene.bodies, scene.items, and their attributes", one.owner)
+                   "{!r} is not in scene.beams, scene.bodies or scene.items", one.owner)
 
     def _number(self, owner, name):
         """Path of an argument, for a beam as "material.E", its value, and "time" or nothing."""
@@ -134,9 +132,8 @@ class Parameters:
             timed = callable(value) and isinstance(owner, Item) and not isinstance(value, float)
             return path, np.array(value(1.0) if timed else value, dtype=float), "time" * timed
         except (TypeError, ValueError):
-            raise InputError(f"{name!r} of {owner!r} is {shown(value)} and no number, array or "
-                             "function of time: add a function with coefficients, as (object, "
-                             f"{name!r}, basis), or use a Design with a function") from None
+            raise InputError(f"{name!r} of {owner!r} is {shown(value)} and no number or array: add "
+                             f"a function, as (object, {name!r}, basis)") from None
 
     def _path(self, owner, name):
         """Where the argument of an object is found, attributes with dots between them."""

@@ -218,13 +218,12 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     rules = Rules("auto", require_positive("tol", tol),
                   require_integer("max_iterations", max_iterations, 1, 10000), 1.0,
                   require_positive("min_step", min_step))
-    if rules.min_step > 1.0:
-        raise InputError(f"min_step must be at most 1, the part of an increment, got {min_step!r}")
+    refuse(rules.min_step > 1.0, "min_step must be at most 1, got {!r}", min_step)
     require_flag("stable", stable)
     u = None if start is None else displacement(system, start)
     t_start = 0.0 if start is None else float(start.t or 0.0)
-    refuse(ends[-1] <= t_start, "the steps end at t = {:g}, which is not after the start at t = "
-           "{:g}", ends[-1], t_start)
+    refuse(ends[-1] <= t_start, "the steps end at t = {:g}, not after the start at t = {:g}",
+           ends[-1], t_start)
     made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
     made.t = t_start
     try:
@@ -234,13 +233,10 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
                 bar.update(instant.t - made.t)
                 made.add(instant)
     except (LoadStepFailed, ConvergenceError) as failure:
-        raise ConvergenceError(
-            f"no equilibrium found after t = {made.t:.6g}: {failure}. The error's state is the "
-            "history up to there; a motion with damping (scene.integrate) goes through what has "
-            "no equilibrium", made.history()) from None
+        raise ConvergenceError(f"no equilibrium found after t = {made.t:.6g}, up to which the "
+                               f"error's state is the history: {failure}", made.history()) from None
     except KeyboardInterrupt:
-        raise Interrupted(f"stopped at t = {made.t:.6g}; the exception's state is the history up "
-                          "to there", made.history()) from None
+        raise Interrupted(f"stopped at t = {made.t:.6g}", made.history()) from None
     return made.history()
 
 
@@ -302,8 +298,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
             stalled = slow > PATIENCE
             if stalled:
                 warn(f"from t = {begin.t:.6g} on only increments of {size:.3g} succeed, where "
-                     f"{most:.3g} was asked for: the next one is solved as solve_static does, "
-                     "whatever the path in between", ModelWarning)
+                     f"{most:.3g} was asked for: the next one leaves the path", ModelWarning)
                 size, slow = most, 0
             target = grid[grid.searchsorted(begin.t, side="right")]
             parts = np.ceil((target - begin.t) / size - 1e-3)

@@ -189,8 +189,7 @@ class Scene(Model):
         scene = super()._on(beams)
         for k, (v, _) in self._velocities.items():
             refuse(not callable(v) and scene.layout.members[k].N != self.layout.members[k].N,
-                   "initial_velocity was given by coordinates and cannot be put on another mesh: "
-                   "give names or functions")
+                   "initial_velocity by coordinates cannot be put on another mesh")
             scene.initial_velocity(v, k)
         scene._sensors = self._sensors
         return scene
@@ -343,14 +342,12 @@ class Scene(Model):
         with self._lock:
             if adapt is None:
                 refuse((goal, max_elements, max_degree) != (GOALS[0], MOST_ELEMENTS, DEGREES[-1]),
-                       "goal=, max_elements= and max_degree= are of an adaptive solution: give "
-                       "adapt=, its tolerance, too")
+                       "goal=, max_elements= and max_degree= need adapt=, a tolerance")
                 system = self.system
                 u = None if start is None else displacement(system, start)
                 state = solve_static(system, u, system.histories.of_state(start), find)
             else:
-                refuse(start is not None, "an adaptive solution begins each mesh from its "
-                       "reference configuration: give adapt= without start=")
+                refuse(start is not None, "give adapt= without start=")
                 state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)
             warn_of(state)
             return state
@@ -482,10 +479,9 @@ class Scene(Model):
             system.forces.contacts.require_clear(np.zeros(system.N), 0.0)
             if branch is not None:
                 refuse(not isinstance(branch, CriticalPoint) or branch.kind != "bifurcation",
-                       "branch must be a point of path.critical_points of kind 'bifurcation', got "
-                       "{!r}", branch)
+                       "branch must be a bifurcation of path.critical_points, got {!r}", branch)
                 refuse(branch.state.system is not system, "the branch point belongs to another "
-                       "scene, or to this one before it was changed: follow its path again")
+                       "scene, or to this one before it was changed")
             try:
                 return Path(system, *continuation(
                     system, steps, ds, ds_max, max_load, until, tol, max_iterations, locate,

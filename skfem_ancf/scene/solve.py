@@ -38,8 +38,8 @@ _GEOMETRY = {
 
 def displacement(system: System, state: State, name: str = "start") -> Array:
     """Displacement (N,) of a State for a scene; ``name`` is for messages."""
-    refuse(not isinstance(state, State), "{} is a State, as of solve_static, got {}; "
-           "scene.state(u) makes one of u of shape ({},)", name, type(state).__name__, system.N)
+    refuse(not isinstance(state, State), "{} is a State, as of solve_static or scene.state(u), got "
+           "{}", name, type(state).__name__)
     other = state.system
     if other is not system:
         refuse(len(other.beams) != len(system.beams), "{} is a state of {} beams, the scene has {}",
@@ -54,12 +54,11 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
             if repr(a.element) != repr(b.element) or not np.array_equal(
                     a.element.doflocs, b.element.doflocs):
                 why = f"its element is {a.element!r}, that of the scene {b.element!r}"
-            refuse(why, "{} is a state of another mesh{}: {}. Its coordinates mean something else "
-                   "here; where they do not, scene.state(other.u) takes them over", name,
-                   f" of beam {b.name or k}" * (len(system.beams) > 1), why)
+            refuse(why, "{} is a state of another mesh{}: {}; scene.state(other.u) takes its "
+                   "coordinates", name, f" of beam {b.name or k}" * (len(system.beams) > 1), why)
     places = [[(tuple(b.position), b.angle) for b in s.bodies] for s in (other, system)]
-    refuse(places[0] != places[1], "{} is a state of other rigid bodies: at (position, angle) {} "
-           "there, {} in the scene", name, places[0], places[1])
+    refuse(places[0] != places[1], "{} is a state of rigid bodies at {}, those of the scene are at "
+           "{}", name, *places)
     return np.array(require_finite(f"{name}.u", state.u, (system.N,)))
 
 
@@ -69,9 +68,8 @@ def configuration(system: System, state: State) -> State:
     if state.system is system:
         return state
     kinds = [[(type(j), j.equations) for j in s.constraints.joints] for s in (state.system, system)]
-    refuse(kinds[0] != kinds[1], "state has multipliers of other joints: {} there, {} in the "
-           "scene; scene.state(u, multipliers) takes them as they are",
-           list(state.system.constraints.joints), list(system.constraints.joints))
+    refuse(kinds[0] != kinds[1], "state has multipliers of other joints, {}: scene.state(u, "
+           "multipliers) takes them", state.system.constraints.joints)
     memory = system.histories.of_state(state)
     return state.replace(system=system, u=u).replace(memory=memory)
 
@@ -335,10 +333,8 @@ def frequency_errors(scene: Any, modes: Modes) -> Array:
     errors = np.where(rigid, np.nan, 4.0 / 3.0 * np.abs(
         modes.frequencies / np.where(rigid, 1.0, better) - 1.0))
     if len(bad := np.flatnonzero(errors > ROUGH)):
-        warn(f"the mesh is coarse for {len(bad)} of {len(errors)} frequencies: number {bad[0]} is "
-             f"about {100 * errors[bad[0]]:.2g} % off, as halved elements show (modes.errors has "
-             "all). Halve the elements, scene.replace(mesh=beam.mesh.refined()), or take elements "
-             f"of higher order along the axis than {scene.beams[0].element!r}, as "
+        warn(f"the mesh is coarse for {len(bad)} of {len(errors)} frequencies, modes.errors: "
+             f"number {bad[0]} is about {100 * errors[bad[0]]:.2g} % off. Use mesh.refined(), or "
              "ElementBeamANCFCubic(2) or ElementBeamCable(5) (docs/choose.md)", ModelWarning)
     return errors
 
@@ -365,9 +361,8 @@ def _solve_for_strain(scene, tol, max_elements, find):
         if len(errors) >= 2 * before[0]:
             if estimate["strain"] > 0.95 * before[1]:
                 raise ConvergenceError(
-                    f"the estimated error of the strain stays at {estimate['strain']:.3g} as "
-                    f"elements are added; adapt = {tol:g} is not reached: the sections cannot show "
-                    "this field, use an element of higher order", state)
+                    f"the estimated error of the strain stays at {estimate['strain']:.3g}, adapt = "
+                    f"{tol:g} is not reached: use an element of higher order", state)
             before = len(errors), estimate["strain"]
         if len(errors) >= max_elements:
             raise _too_few(len(errors), estimate, tol, state)

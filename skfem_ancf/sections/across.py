@@ -406,23 +406,20 @@ class Across(Immutable):
         out = []
         for layer in self.layers:
             terms = list(formulation.terms(self.element_of(layer), layer.material))
-            refuse(not terms, "{!r} has no terms, so the stiffness is zero: terms(element, "
-                   "material) must return at least one Term", formulation)
+            refuse(not terms, "terms(element, material) of {!r} must return a Term", formulation)
             out.append((layer, terms))
             if self.plain:
                 return out
             eta, w = layer.measure.gauss(2)
             for term in terms:
                 refuse(self.element.order and term.section_samples is not None
-                       and layer.measure.moves, "formulation {!r} at order {} uses the mean strain "
-                       "of the section, whose weights would vary along a taper with constant "
-                       "thicknesses: use order 2 or more with the formulation 'assumed' or "
+                       and layer.measure.moves, "formulation {!r} at order {} does not fit a taper "
+                       "with constant thicknesses: use order 2 or more with 'assumed' or "
                        "'continuum', or nu = 0", formulation.name, self.element.order)
                 (x, v), degree = term.section, max(layer.measure.spent, 1)
                 off = v @ legvander(2.0 * x - 1.0, degree) - w @ legvander(2.0 * eta - 1.0, degree)
-                refuse(len(x) > 1 and np.max(np.abs(off)) > 1e-9, "formulation {!r} uses a rule "
-                       "across the section that does not fit {!r}: use the rules that "
-                       "self.full_rules(element) returns", formulation.name, layer.measure)
+                refuse(len(x) > 1 and np.max(np.abs(off)) > 1e-9, "a rule of {!r} does not fit "
+                       "{!r}: use self.full_rules(element)", formulation.name, layer.measure)
         return out
 
     def element_of(self, layer: Layer) -> ElementBeam:

@@ -492,8 +492,8 @@ def evaluated(what: str, function: Callable[..., Any], x: Array, y: Array) -> Ar
     """Values of a function of material coordinates, checked to be positive; ``what`` names it."""
     x, y = (np.ascontiguousarray(a) for a in np.broadcast_arrays(x, y))
     out = ask_array(f"{what}(x, y)", x.shape, function, x, y, number=True)
-    refuse_any(out.ravel() <= 0.0, "{}(x, y) must be positive all over the body: the function "
-               "returns {:.6g} at x = {:.6g}, y = {:.6g}", what, out.ravel(), x.ravel(), y.ravel())
+    refuse_any(out.ravel() <= 0.0, "{}(x, y) must be positive, got {:.6g} at x = {:.6g}, y = "
+               "{:.6g}", what, out.ravel(), x.ravel(), y.ravel())
     return out
 
 
@@ -507,8 +507,8 @@ class Layers(Section):
     has_materials = True
 
     def __init__(self, *parts: Any, width: float | Callable[..., Any] | None = None) -> None:
-        refuse(not parts, "layers are pairs of a thickness and a material, as "
-               "Section.layers((0.001, steel), (0.002, brass), width=0.01); got none")
+        refuse(not parts, "there are no layers: give some, as Section.layers((0.001, steel), "
+               "(0.002, brass), width=0.01)")
         found = []
         for k, layer in enumerate(parts):
             refuse(not isinstance(layer, (tuple, list)) or len(layer) not in (2, 3)
@@ -524,26 +524,25 @@ class Layers(Section):
                 own if callable(own) else require_positive(f"the width of layer {k}", own)))
         refuse(sum(thickness is None for thickness, _, _ in found) > 1, "only one layer can fill "
                "the remaining height: give the others a thickness instead of None")
-        refuse(len({material.plane for _, material, _ in found}) > 1, "the materials of a section "
-               "must all be in plane stress, or all in plane strain")
+        refuse(len({material.plane for _, material, _ in found}) > 1, "materials of a section must "
+               "all be in plane stress, or all in plane strain")
         self.parts = tuple(found)
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         given = [thickness for thickness, _, _ in self.parts]
         total = sum(thickness for thickness in given if thickness is not None)
         least = mesh.height if mesh.heights is None else float(np.min(mesh.heights))
-        refuse(None in given and total >= least * (1.0 - FILLS), "the layers are {:.9g} high "
-               "together, and the mesh {:.9g}{}: nothing is left for that of thickness None", total,
-               least, " where it is least" * (mesh.heights is not None))
+        refuse(None in given and total >= least * (1.0 - FILLS), "layers of {:.9g} in a height of "
+               "{:.9g} leave nothing for that of thickness None", total, least)
         if mesh.heights is not None:
-            refuse(None not in given, "{!r} has constant thicknesses and does not fill a tapered "
-                   "mesh: give one layer the thickness None, to fill the remaining height", self)
+            refuse(None not in given, "{!r} does not fill a tapered mesh: give one layer the "
+                   "thickness None", self)
             return [layer_of(law, width, Moving(partial(_layer, given, k), mesh.height))
                     for k, (_, law, width) in enumerate(self.parts)]
         tops = np.cumsum([mesh.height - total if x is None else x for x in given])
         refuse(abs(tops[-1] - mesh.height) > FILLS * mesh.height, "the thicknesses add up to "
-               "{:.9g}, the height of the mesh is {:.9g}: they must be equal; a layer of thickness "
-               "None fills the remaining height", tops[-1], mesh.height)
+               "{:.9g}, the height of the mesh is {:.9g}: None fills the rest", tops[-1],
+               mesh.height)
         ends = np.append(0.0, tops / tops[-1])
         ends[-1] = 1.0
         return [layer_of(law, width if callable(width) else width * (b - a), Uniform(a, b))
@@ -590,8 +589,7 @@ class Numbers(Section):
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         b, h = self.width, mesh.height
-        refuse(mesh.heights is not None, "a section given by numbers is constant along the beam: "
-               "use a mesh of constant height")
+        refuse(mesh.heights is not None, "a section given by numbers needs a constant height")
         GA = 5.0 / 12.0 * self.EA if self.GA is None else self.GA
         density = None if self.rhoA is None else self.rhoA / (b * h)
         law = PlaneSections(self.EA / (b * h), GA / (b * h), density)
@@ -618,9 +616,8 @@ class Profile(Section):
         self.name = require_option("profile", name, SIZES)
         self.scaled = require_flag("scaled", scaled)
         wanted = SIZES[name]
-        refuse(set(sizes) != set(wanted), "a profile {!r} has the sizes {}; got {}. Its height is "
-               "that of the mesh", name, ", ".join(wanted) or "of the mesh alone",
-               ", ".join(sizes) or "none", error=CallError)
+        refuse(set(sizes) != set(wanted), "a profile {!r} has, besides the height of the mesh, the "
+               "sizes ({}), got ({})", name, ", ".join(wanted), ", ".join(sizes), error=CallError)
         self.sizes = s = {k: require_positive(k, v) for k, v in sizes.items()}
         refuse(s.get("web", 0.0) > s.get("width", np.inf), "the web, {:g}, is wider than the "
                "profile, {:g}", s.get("web"), s.get("width"))
@@ -631,8 +628,8 @@ class Profile(Section):
         width = s.get("width", h)
         thickness = s.get("flange", s.get("wall", 0.0)) / h
         refuse(np.any(thickness * (1 if name == "T" else 2) >= 1.0) or (
-            name == "box" and 2.0 * s["wall"] >= width), "{!r} does not fit in a height of {:g}: "
-            "its walls or flanges fill it; use thinner ones or a higher mesh", self, np.min(h))
+            name == "box" and 2.0 * s["wall"] >= width), "walls or flanges of {!r} do not fit in a "
+            "height of {:g}", self, np.min(h))
         if name == "rectangle":
             return [Piece(0.0, 1.0, width)]
         if name in ("circle", "tube"):
@@ -679,10 +676,8 @@ class Standard(Section):
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         refuse(mesh.heights is not None or abs(mesh.height - self.height) > FILLS * self.height,
-               '{} is {:g} {} high, and the mesh {:g}{}: make it by height=section.height, and '
-               'give the unit of length of the mesh, as Section.profile("IPE 200", unit="mm")',
-               self.name, self.height, self.unit, mesh.height,
-               " with a taper" * (mesh.heights is not None))
+               "{} is {:g} {} high, and the mesh {:g}: make it by height=section.height, a number, "
+               "with the section's unit=", self.name, self.height, self.unit, mesh.height)
         measure = Weighted(self._pieces)
         widths = [np.max(piece.width(np.linspace(*piece[:2], 9))) if callable(piece.width) else
                   piece.width for piece in self._pieces]

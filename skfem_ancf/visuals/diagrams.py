@@ -75,8 +75,7 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
     recover = require_flag("recover", recover)
     require_option("on", on, ("auto", "structure", "length"))
     beams = list(state.beams) if beam is None else [select_beam(state.beams, beam)]
-    refuse(not beams, 'section forces are those of beams, and this scene has none: see its stress '
-           'by state.plot("von_mises") and state.extremes("von_mises")')
+    refuse(not beams, 'section forces are those of beams: see state.plot("von_mises")')
     if on == "auto":
         frame = getattr(state.system.constraints, "frame", None)
         on = "length" if frame is None and len(beams) == 1 else "structure"

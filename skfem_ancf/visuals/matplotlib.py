@@ -138,8 +138,7 @@ def _draw_contact(ax, scenery, state):
 
     if (found := touching(state)) is None:
         return
-    refuse(scenery.note, "contact is drawn to scale, and here are {}: leave out scale= and "
-           "thickness=", scenery.note)
+    refuse(scenery.note, "contact is drawn without scale= and thickness=, got {}", scenery.note)
     x, size = found.points, float(np.max(np.ptp(scenery.every[:, :2], axis=0)))
     most = int(np.argmax(found.pressure))
     direction = found.force / np.maximum(np.hypot(*found.force), 1e-300)
@@ -381,9 +380,8 @@ def plot_curve(x: ArrayLike, y: ArrayLike, ax: Any = None, *, xlabel: str = "", 
         Of matplotlib's ``Axes.plot``.
     """
     save, x, y = page(ax, title, filename, dpi), np.asarray(x), np.asarray(y)
-    refuse(x.shape != y.shape, "x and y of a curve are at the same instants, got {} and {} "
-           "numbers: sensors read all steps, arrays of the history its stored instants", x.shape,
-           y.shape)
+    refuse(x.shape != y.shape, "x and y of a curve are of the same instants, sensors of all steps, "
+           "got {} and {}", x.shape, y.shape)
     ax = new_axes((5.5, 4.0)) if ax is None else ax
     ax.plot(x, y, **{"lw": 1.6, **options})
     dress(ax, title, xlabel, ylabel)

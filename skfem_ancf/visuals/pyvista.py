@@ -110,8 +110,7 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
         if not several and not isinstance(out, pv.UnstructuredGrid):
             raise InputError(f"out must be a mesh that to_pyvista returned, got {shown(out)}")
         blocks, known = (list(out), list(out.keys())) if several else ([out], names[:1])
-        refuse(known != names, "out must be of the same scene: it has {}, the state {}", known,
-               names)
+        refuse(known != names, "out must be of the same scene: it has {}, not {}", known, names)
     bodies = [_fill(block, grid, body_of(grid, wanted, undeformed, fields is None), facts)
               for block, grid in zip(blocks, found)]
     others = [_lines(wall) for wall in walls]

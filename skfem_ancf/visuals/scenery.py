@@ -303,8 +303,8 @@ def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> 
     if not (loads or supports):
         return []
     system: Any = getattr(state, "system", None)
-    refuse(getattr(system, "items", None) is None, "this state does not know the items of its "
-           "scene, as it comes from another process or a file: draw them by scene.plot()")
+    refuse(getattr(system, "items", None) is None, "a state from a file or another process does "
+           "not know the items of its scene: use scene.plot()")
     layout, found, t = Layout(*system.members), list[Symbol](), state.t
     for item in chain.from_iterable(one.expand(layout) for one in system.items):
         factor = 1.0
