@@ -730,12 +730,6 @@ def _require_nodes(name, x):
                "{:.9g} has no length", name, x[:-1], x[1:], error=MeshError)
 
 
-def _require_nodes(name, x):
-    refuse(len(x) < 2, "a beam needs at least two nodes, got {}", len(x), error=MeshError)
-    refuse_any(x[1:] <= x[:-1], "{} must increase along the axis: element {k} from {:.9g} to "
-               "{:.9g} has no length", name, x[:-1], x[1:], error=MeshError)
-
-
 def _radians(angle):
     """An angle as a float; InputError if it is likely to be in degrees."""
     angle = require_finite_scalar("angle", angle)
