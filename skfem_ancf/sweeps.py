@@ -178,8 +178,9 @@ def _members(parameters):
         for name, x in columns.items():  # a text has no shape
             refuse(np.shape(x) == (), "the parameter {!r} must have one value for each member, got "
                    "{!r}: what is the same for all belongs into build", name, x)
-        refuse(len({*map(len, columns.values())}) > 1, "the parameters must have equal lengths, as "
-               "from itertools.product, got {!r}", columns)
+        lengths = {name: len(x) for name, x in columns.items()}
+        refuse(len({*lengths.values()}) > 1, "the parameters must have equal lengths, got {}: for "
+               "all combinations use itertools.product", lengths)
         parameters = [dict(zip(columns, row)) for row in zip(*columns.values())]
     refuse(isinstance(parameters, str) or not hasattr(parameters, "__iter__"), "parameters must be "
            "a dict of arrays or a list of dicts, got {!r}", parameters)

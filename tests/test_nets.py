@@ -55,7 +55,7 @@ def test_what_is_no_line_is_refused():
     points = [(0, 0), (1, 0), (1, 1)]
     for kind, cell in (("triangle", [0, 1, 2]), ("VTK_LAGRANGE_CURVE", [0, 1, 2])):
         mesh = meshio.Mesh(points, [("line", [[0, 1]]), (kind, [cell])])
-        with pytest.raises(MeshError, match=f"kinds \\['{kind}'\\], which are no lines.*'line3'"):
+        with pytest.raises(MeshError, match=f"kinds \\['{kind}'\\]: a frame is made of .*'line3'"):
             Frame.from_meshio(mesh, **OPTIONS)
     mesh = meshio.Mesh([(1, 0), (0, 0), (2, 0)], [("line3", [[0, 1, 2]])])
     with pytest.raises(MeshError, match="does not have its middle between its ends"):
@@ -102,7 +102,7 @@ def test_sets_of_abaqus_may_overlap(tmp_path):
 
 @pytest.mark.parametrize("text, message", [
     ("*ELEMENT, TYPE=B31\n1, 1,2\n2, 2,3\n*ELEMENT, TYPE=B31, ELSET=b\n3, 3,4\n4, 4,5",
-     "a block has none before one that has"),
+     "an .ELEMENT has no set before one that has"),
     ("*Element, type=B31, elset=b\n1, 1,2\n2, 2,3\n*Element, type=B31, elset=b\n3, 3,4\n4, 4,5",
      "'b' is there twice"),
     ("*ELEMENT, TYPE=B31, ELSET=a\n1, 1,2\n2, 2,3\n3, 3,4\n4, 4,5\n*ELSET, ELSET=a\n1",
