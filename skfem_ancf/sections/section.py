@@ -677,7 +677,8 @@ class Standard(Section):
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         refuse(mesh.heights is not None or abs(mesh.height - self.height) > FILLS * self.height,
                '{} is {:g} {} high, and the mesh {:g}: make it by height=section.height, with '
-               'unit="mm" or another one of the section', self.name, self.height, self.unit, mesh.height)
+               'unit="mm" or another one of the section', self.name, self.height, self.unit,
+               mesh.height)
         measure = Weighted(self._pieces)
         widths = [np.max(piece.width(np.linspace(*piece[:2], 9))) if callable(piece.width) else
                   piece.width for piece in self._pieces]
