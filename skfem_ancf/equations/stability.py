@@ -19,7 +19,7 @@ logger = logging.getLogger(__name__)
 #: Smallest stiffness of unconstrained motions, relative to that of the loads.
 STABILISING = 1e-6
 #: And relative to the largest stiffness, of which round-off leaves as much.
-ROUND_OFF = 16.0 * np.finfo(float).eps
+FAINT = 16.0 * np.finfo(float).eps
 #: Largest number of position DOFs for dense eigenvalues.
 DENSE = 64
 #: Largest relative difference of nodal displacements in a rigid translation.
@@ -175,7 +175,7 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
     weights = position_weights(system) * system.constraints.mask
     acting = np.max(loads * weights)
     least = max(STABILISING * acting / (system.size * max(1.0, np.sum(weights))),
-                ROUND_OFF * np.max(np.abs(system.K.diagonal()) * weights))
+                FAINT * np.max(np.abs(system.K.diagonal()) * weights))
     system.K.add_diagonal(-least * weights)
     try:
         system.solver.factorize(u, 1.0, multipliers)
