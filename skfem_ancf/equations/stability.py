@@ -18,8 +18,6 @@ logger = logging.getLogger(__name__)
 
 #: Smallest stiffness of unconstrained motions, relative to that of the loads.
 STABILISING = 1e-6
-#: And relative to the largest stiffness, of which round-off leaves as much.
-FAINT = 16.0 * np.finfo(float).eps
 #: Largest number of position DOFs for dense eigenvalues.
 DENSE = 64
 #: Largest relative difference of nodal displacements in a rigid translation.
@@ -174,8 +172,8 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
         return False
     weights = position_weights(system) * system.constraints.mask
     acting = np.max(loads * weights)
-    least = max(STABILISING * acting / (system.size * max(1.0, np.sum(weights))),
-                FAINT * np.max(np.abs(system.K.diagonal()) * weights))
+    nodes = min(np.sum(weights[s]) for s in system.slices)  # of the smallest part that may be loose
+    least = STABILISING * acting / (system.size * max(1.0, nodes))
     system.K.add_diagonal(-least * weights)
     try:
         system.solver.factorize(u, 1.0, multipliers)
