@@ -113,6 +113,7 @@ class Contacts:
             self.tables = self._tables_after(memory)._replace(
                 lasting=self.tables.lasting | TURNS * (springs > 0))
         self._answers: Any = None
+        self._joint = [*self._joined()]
         self.put(0.0, 0.0, self.tables.poses)
         if self.tables.clear.size:
             u = np.zeros(N)
@@ -366,12 +367,26 @@ class Contacts:
         """For each group its obstacle's number, the :class:`Group`, points (2, n) and gaps (n,)."""
         # Points are relative to the origin.
         self._place(t)
-        out = []
-        for k, group in enumerate(self.groups):
-            pair, at = self.tables.pairs[k], np.arange(len(group[1].first))
-            found = project(pair, NOW, u, at)
-            out.append((group, np.array([found.surface.real, found.surface.imag]), found.gap))
+        out: list[Any] = [None] * len(self.groups)
+        for numbers, pair, ends in self._joint:
+            found = project(pair, NOW, u, np.arange(ends[-1]))
+            x = np.array([found.surface.real, found.surface.imag])
+            for k, surface, gap in zip(numbers, np.split(x, ends, 1), np.split(found.gap, ends)):
+                out[k] = self.groups[k], surface, gap
         return out
+
+    def _joined(self):
+        """Groups of one obstacle with as many weights, side by side in one Pair: their numbers, it
+        and the ends of their points. Each call of NumPy then does many points."""
+        alike: dict[Any, list[int]] = {}
+        for k, (which, group) in enumerate(self.groups):
+            alike.setdefault((which, len(group.weights), len(group.slopes)), []).append(k)
+        for numbers in alike.values():
+            pairs = [self.tables.pairs[k] for k in numbers]
+            whole = {name: np.concatenate([getattr(pair, name) for pair in pairs], axis=-1)
+                     for name in ("dofs", "weights", "slopes", "offsets", "starts")}
+            yield (numbers, pairs[0]._replace(**whole),
+                   np.cumsum([pair.offsets.size for pair in pairs]))
 
     def pushes(self, u: Array, v: Array | None, t: float, start: Array | None = None,
                span: float = 0.0) -> list[tuple[Any, ...]]:
