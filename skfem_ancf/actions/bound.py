@@ -178,6 +178,8 @@ class BoundForce(Bound):
     changing = False
     #: Steps and increments change its history, if it has one; else only samples do.
     evolves = True
+    #: Increments do not change its history, and its mean forces give all work back.
+    conserves = False
     #: With a history, its work that it does not store is dissipated: False for a load.
     dissipates = True
 
@@ -353,7 +355,7 @@ class Remembering:
 
     def accept(self, x: Array, y: Array, v: Array, t: float) -> float:
         """Set the history at the end of an increment from x to y; returns what it dissipates."""
-        if not self.element.evolves:
+        if not self.element.evolves or self.element.conserves:
             return 0.0
         dt, after = float(self.span[0]), self.evaluate(y, v, t)[1]
         mean = self.mean_force(x, y, t - 0.5 * dt, dt or TINY)

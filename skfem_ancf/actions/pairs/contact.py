@@ -18,7 +18,7 @@ from ..contact.points import add_resistance, respond
 from ..forces.base import ForceElement
 from ..places import Vector
 from .facets import ROUND, facets_of, rounded
-from .search import Search, Surfaces
+from .search import BETWEEN, Search, Surfaces
 
 #: Width of the transition from no pressure to proportional pressure, in heights, as of obstacles.
 WIDTH = 1e-3
@@ -110,7 +110,7 @@ class BodyContact(ForceElement):
         self.penalty = None if stiffness is None else require_positive("stiffness", stiffness)
         self.self_contact = require_flag("self_contact", self_contact)
         self.name = require_label("name", name)
-        self.symmetric = self.friction == 0.0
+        self.symmetric = self.conserves = self.friction == 0.0
 
     def __repr__(self) -> str:
         return f"<BodyContact {self.name or shown(self.a)}>"
@@ -276,8 +276,8 @@ class BodyContact(ForceElement):
 
     def passed(self, x: Array, y: Array, t: float) -> str | None:
         z0, z1 = _complex(x, y)
-        self._faced(z1)  # searches if need be
-        if self.search_intervals(x, y) < 1.0 and not len(self.broad_search.candidates.p):
+        gap = float(self._faced(z1)[0].clear[0])
+        if 2.0 * BETWEEN * STRIDE * self.broad_search.height * self.search_intervals(x, y) < gap:
             return None
         if (met := self.broad_search.crossed(z1)) is not None:
             what = "beams have passed through each other"

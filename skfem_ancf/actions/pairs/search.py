@@ -24,6 +24,8 @@ SEEDS, MOST, SKIN = 1.2, 10, 0.5
 SKINS = 2.0, 5.0, 12.0, 30.0, 75.0
 #: Distance of axes that are joined, in heights; parts of an element in which they are searched.
 JOINED, FINE = 1e-3, 8
+#: No candidates.
+NOBODY = Candidates(*(np.zeros(0, kind) for kind in (np.int64, np.int64, float, np.int64)))
 #: Sine of the angle of parallel segments.
 PARALLEL = 1e-6
 #: How much further points between those of a rule may move.
@@ -123,20 +125,32 @@ class Search:
 
     def search(self, z: Array) -> None:
         """Find the :class:`Candidates` at displacements z; the callback of kernels."""
-        x, skin = self.surfaces.outside(z)[0], SKIN
-        known = self._search(x, z, skin * self.height)
-        for wider in SKINS if not len(known.p) else ():  # how far may it move unseen?
-            wide = self._search(x, z, wider * self.height)
+        x, f, m = self.surfaces.outside(z)[0], self.surfaces.facets, len(self._seed_zeta)
+        e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(self._seed_zeta, len(f.sides))
+        y = self.surfaces.along(e, zeta, 0, z)
+        room = self._room(x, y, e) / self.height
+        skin = max(SKIN, room)
+        known = NOBODY if room > SKIN else self._search(x, y, e, zeta, skin * self.height)
+        for wider in SKINS if known is not NOBODY and not len(known.p) else ():
+            wide = self._search(x, y, e, zeta, wider * self.height)  # how far may it move unseen?
             if len(wide.p):
                 break
             known, skin = wide, wider
         t, self.candidates, self._words = self.tables, known, Packed(known)
         t.found[0], t.skin[0], t.seen[:] = self._words.address, skin * self.height, z
 
-    def _search(self, x, z, skin):
-        f, m = self.surfaces.facets, len(self._seed_zeta)
-        e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(self._seed_zeta, len(f.sides))
-        y = self.surfaces.along(e, zeta, 0, z)
+    def _room(self, x, y, e):
+        """The largest skin within which boxes around members say that there is nothing."""
+        f, boxes = self.surfaces.facets, np.full((2, 4, len(self.allowed)), -np.inf)
+        for box, at, members in zip(boxes, (x, y), (f.members[f.of], f.members[e])):
+            for most, values in zip(box, (at.real, at.imag, -at.real, -at.imag)):
+                np.maximum.at(most, members, values)
+        a, b = boxes[0][:, :, None], boxes[1][:, None]
+        away = np.maximum(0.0, np.maximum(-a[2:] - b[:2], -b[2:] - a[:2]))
+        return np.min(np.hypot(*away)[self.allowed]) - np.max(self._near) - self.height
+
+    def _search(self, x, y, e, zeta, skin):
+        f = self.surfaces.facets
         trees = [scipy.spatial.cKDTree(np.column_stack([a.real, a.imag])) for a in (x, y)]
         reach = float(np.max(self._near)) + self.height + skin
         found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
