@@ -224,7 +224,7 @@ class Step(NamedTuple):
 
     dt: float
     t: float  # end of the step
-    acting: float  # instant of the equation of motion
+    t_force: float  # instant of the equation of motion
     factors: F1  # as in StepData
     ends: F1
     supports: F2

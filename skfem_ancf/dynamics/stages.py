@@ -17,7 +17,7 @@ from ..core.band import (SPARE, add_multiple, clear, copy, factorize, factorize_
                          fix_stored, multiply, solve, solve_complex, solve_dependent, solve_joined)
 from ..core import indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
-                                     SINGULAR, judged, noise_of_step)
+                                     SINGULAR, correction_size, judged, noise_of_step)
 from .records import (ITERATIONS, JointMotion, acceleration_of_joints, add_damping,
                       damping_force, drive_rate, row_of, settle)
 
@@ -537,5 +537,5 @@ def _correct(free, method, s, w, state):
             Z[i] += d[i]
             R[i] = d[i]
     state.last_correction[0] = state.correction[0]
-    state.correction[0] = np.sqrt(abs(work) + closing)
+    state.correction[0] = correction_size(work, closing)
     return True

@@ -30,7 +30,8 @@ from ..core.callbacks import JOINTS, call_custom, call_solver
 from ..core import F1, apart, indices, room, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, EXPECTED, FAILED, GO_ON, LASTING, MIXED,
                                      NOT_CONVERGED, RESTART, REUSED, ROUGH, SINGULAR, SLOW,
-                                     SYMMETRIC, UNSETTLED, UNSYMMETRIC, judged, noise_of_step)
+                                     SYMMETRIC, UNSETTLED, UNSYMMETRIC, correction_size,
+                                     judged, noise_of_step)
 from .records import (ALL, AUGMENTED, ITERATIONS, acceleration_of_joints, add_damping,
                       damping_force, drive_rate, factorize_rows, settle, solve_rows, step_of)
 
@@ -99,12 +100,12 @@ def internal_force(e, matrices, rule, s, w, state):
     else:
         body_force(e.body, u, f)
     if rule.conserving > 0:
-        add_elastic_force(e.forces, s.acting, s.dt, u0, u, f)
+        add_elastic_force(e.forces, s.t_force, s.dt, u0, u, f)
     else:
-        add_elastic_force(e.forces, s.acting, 0.0, u, u, f)
+        add_elastic_force(e.forces, s.t_force, 0.0, u, u, f)
     if matrices.dampers.active > 0:  # materials are included already in the mixed iteration
         d = w.x.damping
-        damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.damping_velocity,
+        damping_force(e, matrices.dampers, matrices.M, s.t_force, w.x.middle, w.x.damping_velocity,
                       state.mixed_steps[0], d, w.x.scratch)
         for i in indices(f.size):
             f[i] += d[i]
@@ -119,9 +120,9 @@ def directions(e, matrices, rule, s, w, state):
     if e.joints.custom > 0 and rule.conserving > 0:
         flat = w.J[0].reshape(w.J[0].size)
         clear(flat)
-        call_custom(JOINTS, e.joints.custom, np.int64(5), s.acting, 1.0, w.x.u, w.y[0], flat)
+        call_custom(JOINTS, e.joints.custom, np.int64(5), s.t_force, 1.0, w.x.u, w.y[0], flat)
     else:
-        joint_directions(e.joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
+        joint_directions(e.joints, s.joints.g[1], s.t_force, w.x.middle, w.J[0])
     joint_directions(e.joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
@@ -133,12 +134,12 @@ def residual(e, matrices, rule, s, w, state):
     for i in indices(u.size):
         a[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * e.free[i] + constrained[i]
     multiply(matrices.M, a, scratch)
-    mean_external_force(e.loads, s.factors, s.acting, w.y[0] if rule.conserving > 0 else u, u, R)
+    mean_external_force(e.loads, s.factors, s.t_force, w.y[0] if rule.conserving > 0 else u, u, R)
     for i in indices(u.size):
         R[i] = R[i] - f[i] - scratch[i]
     if rule.solver > 0:
         clear(scratch)
-        add_joint_force(e.joints, s.joints.g[1], s.acting, w.x.middle, w.m.l, scratch)
+        add_joint_force(e.joints, s.joints.g[1], s.t_force, w.x.middle, w.m.l, scratch)
         for i in indices(u.size):
             R[i] -= scratch[i]
     else:
@@ -156,7 +157,7 @@ def add_impulses(e, matrices, rule, s, w, state):
         copy(v, ends[n:2 * n])
         copy(w.y[0], ends[2 * n:3 * n])
         copy(impulse, ends[3 * n:])
-        call_custom(JOINTS, e.joints.custom, np.int64(6), s.acting, 1.0, w.x.u, ends, w.x.residual)
+        call_custom(JOINTS, e.joints.custom, np.int64(6), s.t_force, 1.0, w.x.u, ends, w.x.residual)
         return
     for i in indices(v.size):
         scratch[i] = v0[i] + v[i]
@@ -188,20 +189,20 @@ def tangent(e, matrices, rule, s, w, state):
                     w.x.middle, stresses, w.x.scratch, matrices.A)
         for k in range(dampers.modes.shape[0]):
             matrices.rows.S[k, k] = s.damping_factor
-    add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x.middle, matrices.A)
+    add_load_stiffness(e.loads, s.factors, s.t_force, 1.0, w.x.middle, matrices.A)
     forces, conserving, rate = e.forces, rule.conserving > 0, s.damping_factor / s.stiffness_factor
     if forces.start.size > 0:  # to the band and the low-rank rows
         D = np.empty(forces.size)
-        element_stiffness(forces, s.acting, w.x.middle, w.y[1], rate, D)
+        element_stiffness(forces, s.t_force, w.x.middle, w.y[1], rate, D)
         add_products(A, forces.band_at, forces.band_weight, D, forces.band_of)
         put_between(forces, D, s.stiffness_factor, dampers.modes.shape[0], matrices.rows.S)
     u, u0 = w.x.u, w.y[0] if conserving else w.x.u
-    keep_entries(forces, s.acting, s.stiffness_factor, u0, u)
+    keep_entries(forces, s.t_force, s.stiffness_factor, u0, u)
     if forces.contacts.number > 0:
-        add_contact_tangent(forces, s.acting, s.dt if conserving else 0.0, u0, u, matrices.A)
+        add_contact_tangent(forces, s.t_force, s.dt if conserving else 0.0, u0, u, matrices.A)
         if dampers.elements > 0:
             to_damping_velocity(e.free, rule, s, w)
-            add_friction_tangent(forces, s.acting, rate, w.x.middle, w.x.damping_velocity,
+            add_friction_tangent(forces, s.t_force, rate, w.x.middle, w.x.damping_velocity,
                                  matrices.A)
     for i in indices(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
@@ -223,7 +224,7 @@ def factorize_tangent(e, matrices, rule, s, w, state):
         l, dl, none = w.m.l, w.m.dl, w.x.du[:0]
         for k in indices(l.size):
             dl[k] = s.stiffness_factor * l[k]
-        good = call_solver(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
+        good = call_solver(rule.solver, s.t_force, w.x.middle, dl, none, none, none, none)
     else:
         U = matrices.U
         if state.mixed_steps[0] > LASTING and U.flat.size > 0:
@@ -341,7 +342,7 @@ def add_work(e, matrices, rule, s, w, state):
     for i in indices(u.size):
         damping_velocity[i] = (u[i] - u0[i]) / s.dt
         middle[i] = 0.5 * (u[i] + u0[i])
-    t = s.acting if rule.conserving > 0 else s.t - 0.5 * s.dt
+    t = s.t_force if rule.conserving > 0 else s.t - 0.5 * s.dt
     damping_force(e, matrices.dampers, matrices.M, t, middle, damping_velocity, 0.0, d, w.x.scratch)
     state.dissipated[0] += s.dt * dot(d, damping_velocity)
 
@@ -364,7 +365,7 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
         if matrices.dampers.active > 0:
             add_work(e, matrices, rule, s, w, state)
         if e.lasting > 0:
-            settle(e, (s.acting, s.t), s.dt if rule.conserving > 0 else 0.0, w.y[0], w.x.u, w.x.v,
+            settle(e, (s.t_force, s.t), s.dt if rule.conserving > 0 else 0.0, w.y[0], w.x.u, w.x.v,
                    taken)
             state.dissipated[0] += taken[0]
             copy(e.history, memories[n, 1:])
@@ -499,7 +500,7 @@ def _correct(e, matrices, rule, s, w, state, anew):
         du[i] = R[i]
     if rule.solver == 0:
         solve_rows(A, rows, du)
-    work = abs(dot(R, du))
+    work, closing = dot(R, du), 0.0
     if l.size > 0:
         constraint(e.joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
         for k in indices(l.size):
@@ -525,10 +526,11 @@ def _correct(e, matrices, rule, s, w, state, anew):
         for k in indices(l.size):
             l[k] += dl[k]
             phi[k] = np.abs(phi[k] * dl[k])
-        work += np.sum(phi)
+        closing = np.sum(phi)
     for i in indices(u.size):
         u[i] += du[i]
-    state.last_correction[0], state.correction[0] = state.correction[0], np.sqrt(work)
+    state.last_correction[0], state.correction[0] = (
+        state.correction[0], correction_size(work, closing))
     return GO_ON
 
 
@@ -562,5 +564,5 @@ def _judged(e, matrices, rule, s, w, state, reference, noise):
 @source
 def _far(M, s, w):
     """True if a correction is large compared with the motion in the step."""
-    way = (FAR * s.dt)**2 * kinetic_energy(M, w.y[1], w.x.scratch)
-    return kinetic_energy(M, w.x.du, w.x.scratch) > way
+    limit = (FAR * s.dt)**2 * kinetic_energy(M, w.y[1], w.x.scratch)
+    return kinetic_energy(M, w.x.du, w.x.scratch) > limit

@@ -33,6 +33,12 @@ EPS = 2.2e-16
 
 
 @source
+def correction_size(work, joints):
+    """Size of a correction from its work on the residuals of forces and, >= 0, of joints."""
+    return np.sqrt(abs(work) + joints)
+
+
+@source
 def is_small(size, contraction, tol, reference, noise):
     """True if the error that a correction leaves is within tolerance."""
     return size * min(1.0, contraction) <= tol * reference + noise
@@ -42,6 +48,12 @@ def is_small(size, contraction, tol, reference, noise):
 def is_balanced(residual, force, joint_gap, tol, noise):
     """True if the norm of a residual, and the residual of joints, are within tolerance."""
     return residual <= tol * force + noise and joint_gap <= CLOSED
+
+
+@source
+def is_at_rest(residual, force, joint_gap, tol):
+    """True if nothing has to be corrected, by the residual before the first correction."""
+    return residual <= 1e-3 * tol * force and joint_gap <= CLOSED
 
 
 def joint_gap(phi: Array, sizes: Array) -> float:

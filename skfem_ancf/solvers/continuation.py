@@ -14,7 +14,8 @@ from ..core import (Array, CallbackError, ConvergenceError, Interrupted, ask, re
                     require_function, require_integer, require_positive, shown)
 from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
-from ..equations.convergence import is_balanced, is_small, joint_gap, rules_of
+from ..equations.convergence import (correction_size, is_balanced, is_small, joint_gap,
+                                     rules_of)
 from ..equations.evaluation import invert
 from ..equations.stability import position_weights
 from ..equations.system import System
@@ -316,8 +317,8 @@ class Tracer:
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise LoadStepFailed("the iteration leaves the path")
             before = work if k > 1 else 0.0
-            work = np.sqrt(abs((residual * system.constraints.free) @ du) + abs(phi @ dm)
-                           + abs(dl * (external @ du)))
+            work = correction_size(abs((residual * system.constraints.free) @ du) + abs(phi @ dm),
+                                   abs(dl * (external @ du)))
         raise LoadStepFailed(f"no convergence in {rules.iterations} iterations")
 
 

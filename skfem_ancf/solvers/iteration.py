@@ -12,8 +12,8 @@ from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
 from ..core import F1, MADE, Array, apart, indices, source
-from ..equations.convergence import (CLOSED, FEWEST, NEVER, diverges, is_balanced,
-                                     is_small)
+from ..equations.convergence import (FEWEST, NEVER, correction_size, diverges, is_at_rest,
+                                     is_balanced, is_small)
 from ..equations.tables import Equations
 from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, LOAD, MOVED,
                                     RESIDUAL, U, UNSEEN, Target, balance, examine, hold_back)
@@ -175,7 +175,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             return NOT_FINITE, k, k, by_band and k > 0, UNSEEN
         residuals[k] = rho / size if size > 0.0 else 0.0
         if k == 0:
-            balanced = rho <= 1e-3 * rules.tol * size and joint_gap <= CLOSED
+            balanced = is_at_rest(rho, size, joint_gap, rules.tol)
             # round-off, unless the correction shows that it is the load of a slender beam
             at_rest = rho <= rules.force_noise
         else:
@@ -198,7 +198,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             good = _solve(e, target, loose, x, m)
         before, work = work, np.inf
         if good:
-            work = np.sqrt(abs(dot(R, du)) + abs(dot(phi, dm)))
+            work = correction_size(dot(R, du), abs(dot(phi, dm)))
         if not work < 1e300:
             return SINGULAR, k + 1, k, False, UNSEEN
         if moving:

@@ -201,12 +201,12 @@ def _selected(points, some):
 @source
 def _relative_travel(pair, u):
     """Largest displacement of an element's middle, relative to the radius of its points."""
-    n, way = pair.middles.shape[1], 0.0
+    n, square = pair.middles.shape[1], 0.0
     rows = np.empty((3, n))
     middles(pair, u, 0.0, rows[:2], rows[2])
     for e in range(n):
-        way = max(way, rows[0, e] * rows[0, e] + rows[1, e] * rows[1, e])
-    return np.sqrt(way) / pair.law.radius
+        square = max(square, rows[0, e] * rows[0, e] + rows[1, e] * rows[1, e])
+    return np.sqrt(square) / pair.law.radius
 
 
 # points in contact

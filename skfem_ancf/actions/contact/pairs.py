@@ -195,11 +195,11 @@ def look(t, z, found):
     moved = np.empty(z.size)
     for k in indices(z.size):
         moved[k] = t.moves[k] * size(z[k] - t.seen[k])
-    way = largest(moved)
-    if not way < 0.5 * t.skin[0]:
+    travel = largest(moved)
+    if not travel < 0.5 * t.skin[0]:
         none = t.moves[:0]
         call_custom(SEARCHES, t.handle, np.int64(0), 0.0, 0.0, z.view(np.float64), none, none)
-        way = 0.0
+        travel = 0.0
     known = candidates_of(t)
     far = np.empty(known.p.size)
     for i in indices(far.size):
@@ -209,7 +209,7 @@ def look(t, z, found):
         # the other face of a member, which faces the same way, is never touched
         same = t.sides[e] * cross(T, normal[p]) > SAME * size(T)
         far[i] = where(same, 0.25 * NOTHING, far[i])
-    found.clear[0] = t.skin[0] + t.height - 2.0 * way
+    found.clear[0] = t.skin[0] + t.height - 2.0 * travel
     for i in indices(far.size):
         far[i] = where(far[i] < t.height, NOTHING, far[i])
     found.clear[0] = min(found.clear[0], smallest(far) if far.size > 0 else NOTHING)
@@ -419,8 +419,8 @@ def slip_row(a, b, s):
     of r, t, c and T at two states."""
     t, T = scaled(0.5, a[1] + b[1]), scaled(0.5, a[3] + b[3])
     length = 1.0 / size(T)
-    way, x = scaled(length, T), scaled(0.5, a[0] + b[0]) + scaled(s / size(t), turned(t))
-    return way, by_slope(t, s, way), -way, scaled(length, x - scaled(0.5, a[2] + b[2]))
+    slip, x = scaled(length, T), scaled(0.5, a[0] + b[0]) + scaled(s / size(t), turned(t))
+    return slip, by_slope(t, s, slip), -slip, scaled(length, x - scaled(0.5, a[2] + b[2]))
 
 
 @source
@@ -449,8 +449,8 @@ def touch_of(t, f0, f1, met):
             put(moved, v, i, b[v] - a[v])
         k[i] = firm * met.share[i]
         if t.friction > 0.0:
-            way, held, _ = slip_along(t, f1, p, e)
-            trial[i], spring[i] = firm * way, firm * held
+            path, held, _ = slip_along(t, f1, p, e)
+            trial[i], spring[i] = firm * path, firm * held
     return Touch(met.at, k, met.before, met.after, np.zeros(n), moved, gap, slip, trial, spring)
 
 
@@ -543,13 +543,13 @@ def pair_stiffness(t, z0, z1, same, facets, zeta, K):
         length = size(T)
         outer, x = scaled(t.sides[e] / length, turned(T)), scaled(0.5, x0 + x1 - c0 - c1) + scaled(
             s / size(d), turned(d))
-        way, P, F = scaled(1.0 / length, T), r.pressure[i], r.friction[i] / length
-        # the way from the anchor stretches
+        tangent, P, F = scaled(1.0 / length, T), r.pressure[i], r.friction[i] / length
+        # the slip from the anchor stretches
         held = (1.0 if same else 2.0) * r.friction[i] * (r.spring[i] > 0.0)
-        depth, curl, stretch = dot(outer, x) / length, dot(outer, bend), dot(way, bend)
+        depth, curl, stretch = dot(outer, x) / length, dot(outer, bend), dot(tangent, bend)
         share = 1.0 / (length - depth * curl)  # of the slip in the change of zeta
         turns = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, outer.real, outer.imag)
-        grows = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, way.real, way.imag)
+        grows = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, tangent.real, tangent.imag)
         for a in range(n):
             on = share * touch.slip[a, i]
             w = on - depth / length * (turns[a] + curl * on)
@@ -560,6 +560,6 @@ def pair_stiffness(t, z0, z1, same, facets, zeta, K):
                     + turns[a] * (touch.gap[b, i] - depth * (grows[b] + stretch * at))
                     + grows[a] * (touch.slip[b, i] - depth * turns[b] - 2.0 * length * at)) + (
                     held * on * (grows[b] + stretch * at - curl / length * touch.gap[b, i]))
-        add_bend(d, s, scaled(-P, outer) + scaled(r.friction[i], way), i, K)
+        add_bend(d, s, scaled(-P, outer) + scaled(r.friction[i], tangent), i, K)
     add_coupling(touch, r, K[:, :met.at.size])
     return met.at.size

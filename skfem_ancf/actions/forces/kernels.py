@@ -192,15 +192,15 @@ def add_resisting_force(tables, t, u, v, f):
 
 
 @apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
-def add_contact(contacts, asked, u, v, out):
+def add_contact(contacts, at, u, v, out):
     if contacts.moving > 0:
-        call_custom(POSES, contacts.custom, np.int64(0), asked.t, asked.span, contacts.poses,
+        call_custom(POSES, contacts.custom, np.int64(0), at.t, at.span, contacts.poses,
                     contacts.poses, contacts.poses)
         if np.isnan(contacts.poses[0]):  # a user's function failed: no iteration may end with it
             for i in range(out.size):
                 out[i] = np.nan
             return
-    of_contacts(contacts, asked, u, v, out)
+    of_contacts(contacts, at, u, v, out)
 
 
 @source
