@@ -242,7 +242,7 @@ def _face(t, known, near, found):
         away[i] = where(joined, NOTHING, away[i])
         zeta[i], gap[i], of[i], facets[i] = s, g, p, e
         groups[i], before[i] = known.group[near[i]], where(
-            there & ((g > 0.0) | (g >= begins)), where(joined, NOTHING, np.maximum(g, 0.0)), NOTHING)
+            there & ((g > 0.0) | (g >= begins)) & ~joined, np.maximum(g, 0.0), NOTHING)
     found.clear[0] = min(found.clear[0], smallest(beyond))
     # what is in front of the nearest face of an outline is not behind another one of it
     least_each(front, groups, before)
