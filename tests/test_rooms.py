@@ -89,9 +89,13 @@ def code_lines(path):
 
 
 def public_names(cls):
-    """What a class defines in its body, and attributes that its constructor sets."""
+    """What a class defines in its body, and attributes that its constructor sets; items that a
+    scene has a method for are a list, each one line."""
     names = set()
     for node in cls.body:
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and (
+                getattr(node.value.func, "id", "") == "adds"):
+            continue
         targets = [node.target] if isinstance(node, ast.AnnAssign) else getattr(node, "targets", [])
         names |= {target.id for target in targets if isinstance(target, ast.Name)}
         if isinstance(node, ast.FunctionDef):

@@ -142,6 +142,9 @@ class Scheme:
     filtered = 1
     safety = 1.0
 
+    def __repr__(self):
+        return f"<{type(self).__name__}>"
+
     def step(self, integrator: Any, y: Motion, dt: float) -> Motion:
         """Advance the motion by one step.
 

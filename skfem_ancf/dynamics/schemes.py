@@ -48,9 +48,6 @@ class EnergyMomentum(Scheme):
     conserving = True
     parameters = (0.0, 0.0, 0.5, 1.0)
 
-    def __repr__(self):
-        return "<EnergyMomentum>"
-
     def require(self, system: System) -> None:
         for domain in system.domains:
             refuse(not domain.symmetric, "the tangent of {!r} is not symmetric: there is no energy "
@@ -78,9 +75,6 @@ class EnergyMomentum4(EnergyMomentum):
     order = 4
     filtered = 2
     error_constant = abs(sum(part**5 for part in PARTS)) / 80.0
-
-    def __repr__(self):
-        return "<EnergyMomentum4>"
 
     def require(self, system: System) -> None:
         super().require(system)

@@ -39,7 +39,7 @@ class Grid(NamedTuple):
     elements: Array  # of the cells, (nc,)
     rows: int  # so many points across a section are consecutive
     values: Values | DomainValues | None  # None for a rigid body
-    between: Array = np.zeros((2, 0), dtype=int)  # coincident points of neighbouring elements
+    coincident: Array = np.zeros((2, 0), dtype=int)  # coincident points of neighbouring elements
 
     def points(self, undeformed: bool = False) -> Array:
         """Positions with a zero third component, shape (n, 3)."""
@@ -126,9 +126,9 @@ def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
             for k, (low, high, size) in enumerate(zip(at[:-1], at[1:], sizes))]
     eta = np.concatenate(rows, axis=-1)
     X = np.array(np.broadcast_arrays(xi[:, None], eta))
-    between = np.cumsum([row.shape[-1] for row in rows])[:-1] - 1
+    breaks = np.cumsum([row.shape[-1] for row in rows])[:-1] - 1
     cells = quads(m, eta.shape[-1] - 1).reshape(m, -1, 4)
-    return X.reshape(X.shape[:-2] + (-1,)), np.delete(cells, between, axis=1).reshape(-1, 4)
+    return X.reshape(X.shape[:-2] + (-1,)), np.delete(cells, breaks, axis=1).reshape(-1, 4)
 
 
 def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
@@ -172,7 +172,7 @@ def body_of(grid: Grid, fields: Sequence[Field], undeformed: bool = False, lenie
     # continuous.
     points, cells = grid.points(undeformed), grid.cells
     data = {field.name: _array(field, grid, lenient) for field in fields}
-    a, b = grid.between
+    a, b = grid.coincident
     if not share or not len(a):
         return Body(points, cells, data)
     one = np.ones(len(a), dtype=bool)

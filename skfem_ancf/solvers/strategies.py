@@ -403,9 +403,9 @@ class ContactSearch:
         if flags is not None:
             ways.insert(0, partial(self._released, flags))
         *first, last = ways
-        for way in first:
+        for strategy in first:
             try:
-                return self._stiffened(way(), flags is not None and way is first[0])
+                return self._stiffened(strategy(), flags is not None and strategy is first[0])
             except LoadStepFailed:
                 self._memory[:] = before
         return self._stiffened(last(), False)

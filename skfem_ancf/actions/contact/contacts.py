@@ -510,19 +510,19 @@ def _inside(group, x, places, depth):
         crosses = (a[1] > 0.0) != (b[1] > 0.0)
         right = a[0] * (b[1] - a[1]) - a[1] * (b[0] - a[0])
         odd = np.sum(crosses & ((right > 0.0) == (b[1] > a[1])), axis=1) % 2 == 1
-        way = b - a
-        s = np.clip(-np.sum(a * way, axis=0) / np.maximum(np.sum(way * way, axis=0), TINY), 0, 1)
-        far = np.hypot(*(a + s * way))
-        far[:, [half - 1, -1]] = np.inf  # between elements
-        if np.any(odd & (far.min(axis=1) > depth)):
+        d = b - a
+        s = np.clip(-np.sum(a * d, axis=0) / np.maximum(np.sum(d * d, axis=0), TINY), 0, 1)
+        distance = np.hypot(*(a + s * d))
+        distance[:, [half - 1, -1]] = np.inf  # between elements
+        if np.any(odd & (distance.min(axis=1) > depth)):
             return k
     return None
 
 
-def matched(ours: Iterable[Any], theirs: Iterable[Any],
+def matched(items: Iterable[Any], others: Iterable[Any],
             *same: Callable[[Any, Any], bool]) -> Iterator[tuple[Any, Any]]:
     """Pairs of the same things in two lists, each once, by the first rule that finds one."""
-    rest, left = list(ours), list(theirs)
+    rest, left = list(items), list(others)
     for rule in same:
         for one in tuple(rest):
             k = next((k for k, other in enumerate(left) if rule(one, other)), None)
@@ -531,7 +531,7 @@ def matched(ours: Iterable[Any], theirs: Iterable[Any],
                 yield one, left.pop(k)
 
 
-def take_over(ours: Contacts, theirs: Contacts, u: Array, t: float) -> bool:
+def take_over(contacts: Contacts, earlier: Contacts, u: Array, t: float) -> bool:
     """Give contacts the history of others, where there is one; else friction begins at u, t."""
     def known(contacts, k):
         which, group = contacts.groups[k]
@@ -539,16 +539,16 @@ def take_over(ours: Contacts, theirs: Contacts, u: Array, t: float) -> bool:
         return (group.first, group.weights, group.law, np.array(shape.kind),
                 shape.numbers_about(np.zeros(2)))
 
-    found = [*matched(range(len(ours.groups)), range(len(theirs.groups)), lambda k, j: all(
-        map(np.array_equal, known(ours, k), known(theirs, j))))]
+    found = [*matched(range(len(contacts.groups)), range(len(earlier.groups)), lambda k, j: all(
+        map(np.array_equal, known(contacts, k), known(earlier, j))))]
     if found:
-        new, old = ours.tables.memory, theirs.tables.memory
-        ours.begin(u, t, len(found) < len(ours.groups))
+        new, old = contacts.tables.memory, earlier.tables.memory
+        contacts.begin(u, t, len(found) < len(contacts.groups))
         new[:HEAD] = old[:HEAD]
-        new[ANCHORED] = ours.anchored
+        new[ANCHORED] = contacts.anchored
     for k, j in found:
-        a, b = ours.tables.pairs[k], theirs.tables.pairs[j]
+        a, b = contacts.tables.pairs[k], earlier.tables.pairs[j]
         for x, y in zip(a[-5:], b[-5:]):  # largest multiplier, firmness, and those of points
             x[:] = y
-        a.anchors[:] += complex(*(theirs.origin - ours.origin))
+        a.anchors[:] += complex(*(earlier.origin - contacts.origin))
     return bool(found)

@@ -88,22 +88,22 @@ class _Path:
         x = self._seen(z, t)
         gap = self._gap(x, t)
         self.deepest = max(self.deepest, -float(np.min(gap)))
-        way = np.hypot(*np.moveaxis(np.diff(x, axis=0), 1, 0))
+        path = np.hypot(*np.moveaxis(np.diff(x, axis=0), 1, 0))
         if v is not None:
             h, change, rates = np.diff(t)[:, None, None], np.diff(z, axis=0), self._vectors(v)
-            way += BENT * sum(self._sizes(h * rate - change) for rate in (rates[:-1], rates[1:]))
+            path += BENT * sum(self._sizes(h * rate - change) for rate in (rates[:-1], rates[1:]))
         most = depth + np.maximum(-np.minimum(gap[:-1], gap[1:]), 0.0)
-        long = way - gap[:-1] - gap[1:] > 2.0 * most
+        long = path - gap[:-1] - gap[1:] > 2.0 * most
         inside = np.maximum(gap[:-1], gap[1:]) < -depth
         for k in np.flatnonzero((long | inside).any(axis=1)):
             at, = np.nonzero(long[k] | inside[k])
             of = slice(k, k + 2)
-            if self._crosses(at, u[of], None if v is None else v[of], t[of], way[k, at],
+            if self._crosses(at, u[of], None if v is None else v[of], t[of], path[k, at],
                              most[k, at], long[k, at], inside[k, at]):
                 return int(k)
         return None
 
-    def _crosses(self, at, u, v, t, way, most, long, inside):
+    def _crosses(self, at, u, v, t, path, most, long, inside):
         """True if one of some points crosses the obstacle in a step."""
         normals = [self._asked(x[:, at], s, True)[1:3]
                    for x, s in zip(self._seen(self._vectors(u), t), t)]
@@ -114,7 +114,7 @@ class _Path:
         if not chosen.any():
             return False
         at, most = at[chosen], most[chosen]
-        parts = int(np.clip(np.ceil(way[chosen].max() / (2.0 * self._group.depth)), 2, MOST_PARTS))
+        parts = int(np.clip(np.ceil(path[chosen].max() / (2.0 * self._group.depth)), 2, MOST_PARTS))
         for s in np.arange(1, parts) / parts:
             time = t[:1] + s * (t[1] - t[0])
             x = self._seen(self._vectors(_between(u, v, t, s)[None]), time)[..., at]

@@ -182,8 +182,8 @@ def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, floa
 def _along_elements(group):
     """Position xi (n,) of points along their elements, of ends along the height."""
     x = group.starts[:2].reshape(2, 2 * group.elements, -1)
-    way = np.cumsum(np.hypot(*np.diff(x, axis=2, prepend=x[..., :1])), axis=1)
-    return (way / np.maximum(way[:, -1:], 1e-300)).ravel()
+    length = np.cumsum(np.hypot(*np.diff(x, axis=2, prepend=x[..., :1])), axis=1)
+    return (length / np.maximum(length[:, -1:], 1e-300)).ravel()
 
 
 def _balanced(group, pressure):

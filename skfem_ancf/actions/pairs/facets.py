@@ -116,12 +116,12 @@ def rounded(f: Facets, radius: float) -> Facets:
         1j * f.sides * f.offsets)[:, None] * T / np.abs(T)
     # counterclockwise a facet begins at zeta = side
     first, last = ((sign * f.sides > 0.0).astype(int) for sign in (1.0, -1.0))
-    way = -f.sides[:, None] * T / np.abs(T)
+    tangent = -f.sides[:, None] * T / np.abs(T)
     trees = [scipy.spatial.cKDTree(np.column_stack([y.real, y.imag])) for y in (
         x[number, last], x[number, first])]
     met = trees[0].sparse_distance_matrix(trees[1], MEET * radius, output_type="ndarray")
     a, b = met["i"], met["j"]
-    turn = np.angle(np.conj(way[a, last[a]]) * way[b, first[b]])
+    turn = np.angle(np.conj(tangent[a, last[a]]) * tangent[b, first[b]])
     some = (f.members[a] == f.members[b]) & (turn > TURN)
     a, b, turn = a[some], b[some], turn[some]
     long = np.minimum(np.minimum(radius * np.tan(0.5 * turn), LONGEST * radius),

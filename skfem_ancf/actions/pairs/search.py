@@ -267,8 +267,8 @@ class Search:
             root = np.sqrt(k1 * k1 - 4.0 * k2 * k0)
             far = -0.5 * (k1 + np.copysign(root, k1))
             for t in (far / k2, k0 / far):
-                edge, way = g + t * (h - g), u + t * (v - u)
-                share = dot(edge, way) / np.abs(edge) ** 2
+                edge, path = g + t * (h - g), u + t * (v - u)
+                share = dot(edge, path) / np.abs(edge) ** 2
                 inward = f.sides[solid[e]] * (k1 + 2.0 * t * k2) < 0.0
                 hit = (t >= 0.0) & (t <= 1.0) & (share >= 0.0) & (share <= 1.0) & inward
                 if np.any(hit):
@@ -294,11 +294,11 @@ def _distance(a, b):
     """The least distance of segments (n, 2)."""
     out = np.where(crossing(a, b), 0.0, np.inf)
     for p, q in ((a, b), (b, a)):
-        way = q[:, 1] - q[:, 0]
+        path = q[:, 1] - q[:, 0]
         for k in (0, 1):
             d = p[:, k] - q[:, 0]
-            share = np.clip(dot(way, d) / np.abs(way) ** 2, 0.0, 1.0)
-            out = np.minimum(out, np.abs(d - share * way))
+            share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
+            out = np.minimum(out, np.abs(d - share * path))
     return out
 
 
