@@ -272,8 +272,8 @@ class FrameGraph:
             x = require_finite("the point", place, (2,))
             off = np.hypot(*(self.points - x[:, None]))
             k = int(np.argmin(off))
-            refuse(off[k] > 1e3 * NEAR * self.size, "no node is at {:.9g}: the nearest is number "
-                   "{} at {:.9g}", x, k, self.points[:, k], error=MeshError)
+            refuse(off[k] > 1e3 * NEAR * self.size, "no node of the frame is at {:.9g}: the "
+                   "nearest is number {} at {:.9g}", x, k, self.points[:, k], error=MeshError)
             return np.array([k])
         if callable(place):
             chosen = satisfying(place, self.points, "nodes")

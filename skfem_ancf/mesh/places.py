@@ -191,9 +191,10 @@ class Finder:
         e, X, outside, tied = self.find(x, chain)
         bad, mesh = ~(outside <= self.allowed), self.mesh
         if bad.any():
-            refuse_any(bad, "the point {:.9g} is outside {} in the reference configuration of "
-                       "height {:.6g}, whose axis runs from {} to {}; {}", x,
-                       "the body" if chain is None else "the line that was named", mesh.height,
+            refuse_any(bad, "the point {:.9g} is outside {}{}: the reference configuration has the "
+                       "height {:.6g}, and its axis runs from {} to {}; {}", x,
+                       "the body" if chain is None else "the line that was named",
+                       f" ({bad.sum()} of {len(bad)} points are)" * (len(bad) > 1), mesh.height,
                        mesh.p[:, 0].tolist(), mesh.p[:, -1].tolist(), self.extent, error=MeshError)
         return e, X, tied
 
