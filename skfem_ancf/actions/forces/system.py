@@ -252,7 +252,8 @@ class Forces:
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.custom, self._slices)) + (
             0.0 if is_clear(self.clear, u, 0.0) else sum(
-                element.potential_at(u[at].reshape(-1, 2), t) for element, at in self._paired))
+                element.potential_at(u[at].reshape(-1, 2), t) or 0.0
+                for element, at in self._paired))
 
     @property
     def sampled(self) -> list[Any]:
