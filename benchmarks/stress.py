@@ -24,6 +24,7 @@ from skfem_ancf import (Beam, ConvergenceError, ElasticPlastic, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, MeshBeam, ModelWarning, NeoHookean,
                         Prony, Scene, StVenantKirchhoff, Voce)
 from skfem_ancf.actions.forces import ForceElement, point
+from skfem_ancf.actions.obstacles import Line
 from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.core.progress import progress_bar
 from skfem_ancf.core.quadrature import gauss
@@ -671,9 +672,32 @@ def pairs(quick, out):
                 np.abs(turn)), 1e-10)
 
 
+def wires(quick, out):
+    """Wavy wires that nothing holds, squeezed in a box until half of its height is left."""
+    h, E = 0.02, 1e6
+    for n, friction in ((2, 0.0),) if quick else ((3, 0.0), (3, 0.2), (6, 0.0), (6, 0.2), (20, 0.0)):
+        element, m = (ElementBeamANCFCubic(1), 10) if n == 20 else (ElementBeamCable(3), 4)
+        beams = [Beam(MeshBeam.init_curve(
+            lambda s, c=c, k=k: np.array([s, (3.6 * k + 1.2 * np.sin(2 * np.pi * s + c)) * h]),
+            np.linspace(0, 1, m + 1), height=h), element, StVenantKirchhoff(E, 0.0, 1.0), 1.0)
+            for k, c in enumerate(np.random.default_rng(3).uniform(0, 2 * np.pi, n))]
+        scene, low, top = Scene(*beams).contact("all", friction=friction), -1.8 * h, (
+            3.6 * n - 1.8) * h
+        for point, normal in (((-0.02, 0), (1, 0)), ((1.02, 0), (-1, 0)), ((0, low), (0, 1))):
+            scene.obstacle(Line(point, normal))
+        scene.obstacle(Line((0, top), (0, -1)), position=lambda t, d=0.5 * (top - low): (0, -d * t))
+        run = scene.run(1.0, increments=200 if n == 20 else 20)
+        case = f"{n} wires, friction {friction}"
+        deepest = max(state.contact().penetration for state in run)
+        floor, lid = (run.state(-1).contact(k).total[1] for k in (2, 3))
+        yield Row("wires", case, "penetration over height", deepest / h, 1e-2)
+        # friction of the ends on the side walls, and the drag of what is loose
+        yield Row("wires", case, "difference of floor and lid", (floor + lid) / lid, 0.15)
+
+
 CHECKS = (formulations_table, slenderness, fine_and_slender, thick_and_heavy, poisson, orders,
           units, far_away, length_ratios, loads, rigid_motions, spin, pendulum, histories,
-          pairs)
+          pairs, wires)
 
 
 def run(out="out/stress", quick=False, progress=None, checks=CHECKS):

@@ -142,7 +142,7 @@ def _read(path: StrPath) -> dict[str, Any]:
     """The groups of arrays of a checkpoint, and its single arrays, by name."""
     path = require_path("checkpoint", path, (".npz",))
     refuse(not path.exists(), "there is no file {!r}", str(path), error=CheckpointError)
-    with retold((OSError, Unreadable), "{!r} cannot be read, it is not a checkpoint or damaged: "
+    with retold((OSError, Unreadable), "'{}' cannot be read, it is not a checkpoint or damaged: "
                 "{error}", str(path), error=CheckpointError):
         arrays = read(path)
     refuse(str(arrays.get("format")) != FORMAT, "{!r} is not a checkpoint of a motion, or not of "
