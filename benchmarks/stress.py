@@ -675,7 +675,8 @@ def pairs(quick, out):
 def wires(quick, out):
     """Wavy wires that nothing holds, squeezed in a box until half of its height is left."""
     h, E = 0.02, 1e6
-    for n, friction in ((2, 0.0),) if quick else ((3, 0.0), (3, 0.2), (6, 0.0), (6, 0.2), (20, 0.0)):
+    for n, friction in ((2, 0.0),) if quick else (
+            (3, 0.0), (3, 0.2), (6, 0.0), (6, 0.2), (20, 0.0)):
         element, m = (ElementBeamANCFCubic(1), 10) if n == 20 else (ElementBeamCable(3), 4)
         beams = [Beam(MeshBeam.init_curve(
             lambda s, c=c, k=k: np.array([s, (3.6 * k + 1.2 * np.sin(2 * np.pi * s + c)) * h]),
@@ -683,8 +684,8 @@ def wires(quick, out):
             for k, c in enumerate(np.random.default_rng(3).uniform(0, 2 * np.pi, n))]
         scene, low, top = Scene(*beams).contact("all", friction=friction), -1.8 * h, (
             3.6 * n - 1.8) * h
-        for point, normal in (((-0.02, 0), (1, 0)), ((1.02, 0), (-1, 0)), ((0, low), (0, 1))):
-            scene.obstacle(Line(point, normal))
+        for place, normal in (((-0.02, 0), (1, 0)), ((1.02, 0), (-1, 0)), ((0, low), (0, 1))):
+            scene.obstacle(Line(place, normal))
         scene.obstacle(Line((0, top), (0, -1)), position=lambda t, d=0.5 * (top - low): (0, -d * t))
         run = scene.run(1.0, increments=200 if n == 20 else 20)
         case = f"{n} wires, friction {friction}"
