@@ -277,22 +277,39 @@ def test_a_ring_is_pressed_flat_until_it_touches_itself():
     assert len(state.contact()) and state.contact().penetration < 0.01 * h
 
 
-def test_wires_that_nothing_holds_are_squeezed_in_a_box():
-    h, n, rng = 0.02, 3, np.random.default_rng(3)
+def squeezed(n, friction):
+    """Wires on each other in a box whose lid comes down by half of the height: the run, and h."""
+    h, rng = 0.02, np.random.default_rng(3)
     wires = [Beam(MeshBeam.init_curve(
         lambda s, c=c, k=k: np.array([s, (3.6 * k + 1.2 * np.sin(2 * np.pi * s + c)) * h]),
         np.linspace(0, 1, 5), height=h), ElementBeamCable(3), StVenantKirchhoff(1e6, 0.0, 1.0),
         width=1.0) for k, c in enumerate(rng.uniform(0, 2 * np.pi, n))]
-    scene, low, top = Scene(*wires).contact("all"), -1.8 * h, (3.6 * n - 1.8) * h
+    scene, low, top = Scene(*wires).contact("all", friction=friction), -1.8 * h, (3.6 * n - 1.8) * h
     for point, normal in (((-0.02, 0), (1, 0)), ((1.02, 0), (-1, 0)), ((0, low), (0, 1))):
         scene.obstacle(Line(point, normal))
     scene.obstacle(Line((0, top), (0, -1)), position=lambda t: (0.0, -0.5 * t * (top - low)))
-    state = scene.run(1.0, increments=20).state(-1)
+    run = scene.run(1.0, increments=20)
+    state = run.state(-1)
+    y = np.array([state.u[s][1::4] + b.mesh.p[1] for s, b in zip(scene.system.slices, wires)])
+    assert np.all(np.diff(y, axis=0) > 0.5 * h)  # no wire has passed through another one
+    return run, h
+
+
+def test_wires_that_nothing_holds_are_squeezed_in_a_box():
+    run, h = squeezed(3, 0.0)
+    state = run.state(-1)
     assert state.contact().penetration < 0.01 * h
     floor, lid = (state.contact(k).total[1] for k in (2, 3))
     assert lid < -1.0 and abs(floor + lid) < -0.06 * lid  # the rest is drag
-    y = np.array([state.u[s][1::4] + b.mesh.p[1] for s, b in zip(scene.system.slices, wires)])
-    assert np.all(np.diff(y, axis=0) > 0.5 * h)  # no wire has passed through another one
+
+
+def test_wires_with_friction_are_squeezed_in_a_box(needs_compiled):
+    run, h = squeezed(4, 0.2)
+    assert run.t[-1] == 1.0 and max(state.contact().penetration for state in run) < 0.01 * h
+    state = run.state(-1)
+    force = np.sum([state.contact(k).total for k in range(4)], axis=0)
+    assert state.contact(3).total[1] < -1.0 and np.all(np.diff(run.dissipated) >= -1e-6)
+    assert np.abs(force).max() < -0.15 * state.contact(3).total[1]  # the rest is drag
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
