@@ -213,7 +213,8 @@ class Search:
         yield "smaller load steps", partial(self.load_steps, "mixed", few)
         if self.stable and not early:
             yield "descent", self.descent
-            yield "load steps as small as may be", partial(self.load_steps, "mixed")
+            if system.clock is None:  # increments of a run are cut instead
+                yield "load steps as small as may be", partial(self.load_steps, "mixed")
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
