@@ -17,7 +17,7 @@ from ..core import Array
 logger = logging.getLogger(__name__)
 
 #: Smallest stiffness of unconstrained motions, relative to that of the loads.
-STABILISING = 1e-6
+STABILISING = 1e-5
 #: Largest number of position DOFs for dense eigenvalues.
 DENSE = 64
 #: Largest relative difference of nodal displacements in a rigid translation.
