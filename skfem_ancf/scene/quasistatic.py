@@ -236,7 +236,8 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         raise ConvergenceError(f"no equilibrium found after t = {made.t:.6g}, up to which the "
                                f"error's state is the history: {failure}", made.history()) from None
     except KeyboardInterrupt:
-        raise Interrupted(f"stopped at t = {made.t:.6g}", made.history()) from None
+        raise Interrupted(f"stopped at t = {made.t:.6g}; the exception's state is the history up "
+                          "to there", made.history()) from None
     return made.history()
 
 
@@ -339,15 +340,16 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     if drag is not None:
         return _loose(system, last, t, drag, start, Options(
             route, "mixed", rules.tol, rules.max_iterations, close=True), smallest)
-    search = partial(Search, system, last.result.u, last.result.memory, rules, stable, False,
-                     t - last.t)
+    search = partial(Search, system, last.result.u, last.result.memory, rules=rules, stable=stable,
+                     progress=False, span=t - last.t)
     bounded = (system.forces.contacts.obstacles or system.forces.changing
                or system.constraints.missing_supports)
     for method in ("mixed", "descent" if bounded else "newton", *(("all",) if smallest else ())):
         try:
             if method == "all":
                 logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
-                result = search().find()
+                # the whole increment at once has been tried, where nothing may touch
+                result = search(rules=rules if bounded else rules._replace(first_step=CUT)).find()
                 method = result.attempts[-1].strategy
                 result.rubbed += last.result.rubbed
             elif method == "descent":
