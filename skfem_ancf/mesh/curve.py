@@ -48,8 +48,8 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
     refuse(noise < 0, "noise must not be negative, got {!r}", noise, error=MeshError)
     steps = np.hypot(*np.diff(x, axis=0).T)
     # the spline would turn between points so close
-    refuse_any(steps <= CLOSE * np.max(steps), "the points {k} and {} are both at {}",
-               np.arange(1, n), x[:-1].T, error=MeshError)
+    refuse_any(steps <= CLOSE * np.max(steps), "the points {k} and {} are both at {}: "
+               "leave one out", np.arange(1, n), x[:-1].T, error=MeshError)
     s = np.append(0.0, np.cumsum(steps))
     (t, c, k), _ = splprep(x.T, u=s, s=n * noise**2, k=min(3, n - 1))
     curve = BSpline(t, np.array(c), k, axis=1)

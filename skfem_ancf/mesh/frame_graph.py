@@ -165,8 +165,8 @@ class FrameGraph:
         refuse_any((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n), "line {k} joins the points "
                    "{}, which are numbered 0 to {}", self.lines, n - 1, error=MeshError)
         refuse_any(a == b, "line {k} joins the point {} to itself", a, error=MeshError)
-        refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line",
-                   self.points, error=MeshError)
+        refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line: "
+                   "remove it, or join it to another point", self.points, error=MeshError)
         self._merge(tol)
         self._require_lines()
         self.beams = tuple(self.groups) if beams is None else tuple(beams)
@@ -187,7 +187,8 @@ class FrameGraph:
         for i, j in zip(self.distinct[first], self.distinct):
             if i != j and not {int(i), int(j)} & set(self.curves):
                 raise MeshError(f"lines {i} and {j} are the same: both join the points "
-                                f"{np.sort(self.lines[:, j]).tolist()}")
+                                f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
+                                "them a curve")
         # warn of nodes on a straight line between its ends: lines are joined at their
         # ends only
         some = np.setdiff1d(self.distinct, list(self.curves))

@@ -109,7 +109,8 @@ class LoadCases(Mapping):
                 require_option("load case", case, self.cases)
             self.combinations[name] = {case: require_finite_scalar(f"factor of {case!r}", factor)
                                        for case, factor in factors.items()}
-        refuse(not self.combinations, "there is no load case")
+        refuse(not self.combinations, "there is no load case: give functions by "
+               "name, as {'snow': lambda scene: scene.line_load((0, -1e3))}")
         self._states: dict[str, State] = {}
 
     def factored(self, name: str) -> Scene:

@@ -321,8 +321,9 @@ class Design:
 
 def require_same_size(system: Any, N: int, m: int) -> None:
     """Raise InputError for other numbers of degrees of freedom or of joint equations."""
-    refuse((system.N, system.constraints.m) != (N, m), "the parameters change the number of "
-           "degrees of freedom or of joint equations")
+    found = system.N, system.constraints.m
+    refuse(found != (N, m), "the parameters change the number of degrees of freedom or of joint "
+           "equations, from {} and {} to {} and {}", N, m, *found)
 
 
 class Differences:

@@ -347,7 +347,8 @@ class Scene(Model):
                 u = None if start is None else displacement(system, start)
                 state = solve_static(system, u, system.histories.of_state(start), find)
             else:
-                refuse(start is not None, "give adapt= without start=")
+                refuse(start is not None, "an adaptive solution begins at the reference "
+                       "configuration: give adapt= without start=")
                 state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)
             warn_of(state)
             return state

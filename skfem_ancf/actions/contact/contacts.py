@@ -113,7 +113,7 @@ class Contacts:
             self.tables = self._tables_after(memory)._replace(
                 lasting=self.tables.lasting | TURNS * (springs > 0))
         self._answers: Any = None
-        self._joint = [*self._joined()]
+        self._by_obstacle = [*self._side_by_side()]
         self.put(0.0, 0.0, self.tables.poses)
         if self.tables.clear.size:
             u = np.zeros(N)
@@ -368,14 +368,14 @@ class Contacts:
         # Points are relative to the origin.
         self._place(t)
         out: list[Any] = [None] * len(self.groups)
-        for numbers, pair, ends in self._joint:
+        for numbers, pair, ends in self._by_obstacle:
             found = project(pair, NOW, u, np.arange(ends[-1]))
             x = np.array([found.surface.real, found.surface.imag])
             for k, surface, gap in zip(numbers, np.split(x, ends, 1), np.split(found.gap, ends)):
                 out[k] = self.groups[k], surface, gap
         return out
 
-    def _joined(self):
+    def _side_by_side(self):
         """Groups of one obstacle with as many weights, side by side in one Pair: their numbers, it
         and the ends of their points. Each call of NumPy then does many points."""
         alike: dict[Any, list[int]] = {}

@@ -271,13 +271,17 @@ class BodyContact(ForceElement):
         return float(self._faced(_complex(x, x)[0])[0].clear[0])
 
     def search_intervals(self, x: Array, y: Array) -> float:
+        return self._travel(x, y) / (STRIDE * self.broad_search.height)
+
+    def _travel(self, x, y):
+        """The largest displacement of a point from x to y."""
         a, b = (self._surfaces.outside(z)[0] for z in _complex(x, y))
-        return float(np.max(np.abs(b - a)) / (STRIDE * self.broad_search.height))
+        return float(np.max(np.abs(b - a)))
 
     def passed(self, x: Array, y: Array, t: float) -> str | None:
         z0, z1 = _complex(x, y)
         gap = float(self._faced(z1)[0].clear[0])
-        if 2.0 * BETWEEN * STRIDE * self.broad_search.height * self.search_intervals(x, y) < gap:
+        if 2.0 * BETWEEN * self._travel(x, y) < gap:  # neither side came as far as the other
             return None
         if (met := self.broad_search.crossed(z1)) is not None:
             what = "beams have passed through each other"

@@ -129,13 +129,14 @@ class Search:
         e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(self._seed_zeta, len(f.sides))
         y = self.surfaces.along(e, zeta, 0, z)
         room = self._room(x, y, e) / self.height
-        skin = max(SKIN, room)
-        known = NOBODY if room > SKIN else self._search(x, y, e, zeta, skin * self.height)
-        for wider in SKINS if known is not NOBODY and not len(known.p) else ():
-            wide = self._search(x, y, e, zeta, wider * self.height)  # how far may it move unseen?
-            if len(wide.p):
-                break
-            known, skin = wide, wider
+        known, skin = NOBODY, room
+        if not room > SKIN:
+            known, skin = self._search(x, y, e, zeta, SKIN * self.height), SKIN
+            for wider in SKINS if not len(known.p) else ():  # how far may it move unseen?
+                wide = self._search(x, y, e, zeta, wider * self.height)
+                if len(wide.p):
+                    break
+                known, skin = wide, wider
         t, self.candidates, self._words = self.tables, known, Packed(known)
         t.found[0], t.skin[0], t.seen[:] = self._words.address, skin * self.height, z
 
