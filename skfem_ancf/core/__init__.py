@@ -1,16 +1,16 @@
 """Errors, argument checks, quadrature, band matrices, compilation: names for the other folders."""
 
-from .errors import (AncfError, CallError, CallbackError, CheckpointError, CheckpointWarning,
-                     ConvergenceError, FileError, InputError, Interrupted, MeshError, MissingExtra,
-                     ModelWarning, NameUnknown, NearMisses, PickleError, StabilityWarning,
-                     SupportError, SweepWarning, along, ask, ask_array, ask_field, ask_number,
-                     explained, is_masked, refuse, refuse_any, require_direction, require_finite,
-                     require_finite_scalar, require_flag, require_function, require_increasing,
-                     require_index, require_integer, require_kind, require_label, require_like,
-                     require_moderate, require_module, require_names, require_not_negative,
-                     require_option, require_options, require_path, require_point, require_positive,
-                     require_slope, require_text, require_unmasked, retold, sample, shown,
-                     warn, warnings_as_errors)
+from .errors import (NO_FACTORS, AncfError, CallError, CallbackError, CheckpointError,
+                     CheckpointWarning, ConvergenceError, FileError, InputError, Interrupted,
+                     MeshError, MissingExtra, ModelWarning, NameUnknown, NearMisses, PickleError,
+                     StabilityWarning, SupportError, SweepWarning, along, ask, ask_array, ask_field,
+                     ask_number, explained, is_masked, refuse, refuse_any, require_direction,
+                     require_finite, require_finite_scalar, require_flag, require_function,
+                     require_increasing, require_index, require_integer, require_kind,
+                     require_label, require_like, require_moderate, require_module, require_names,
+                     require_not_negative, require_option, require_options, require_path,
+                     require_point, require_positive, require_slope, require_text, require_unmasked,
+                     retold, sample, shown, warn, warnings_as_errors)
 from .types import Array, ArrayLike, Law, Place, Rule, StrPath, TimeFunction
 from .immutable import (Immutable, array_cache, cached_property, is_builtin, packed, read_only,
                         rebuilt)

@@ -27,8 +27,6 @@ LOST = 1e-13
 REPEATED = 1e-13
 #: Eigenvalue that is round-off, for a unit diagonal.
 SINGULAR = 4.0 * np.finfo(float).eps
-#: Exceptions of factorisations and eigenvalue solvers.
-NO_FACTORS = np.linalg.LinAlgError, RuntimeError
 #: Pivot below which the smallest eigenvalue may be round-off, for a unit diagonal.
 SMALL = 1e-7
 #: Growth of entries at which a pivot block is enlarged, for a unit diagonal.
@@ -68,11 +66,11 @@ class Band(NamedTuple):
 
 class BandMatrix(Band):
     """A square :class:`Band` that is assembled by element, multiplied, factorised and solved with.
-    :meth:`factorize` leaves the entries: Cholesky factors, or pivoted LU of LAPACK for unsymmetric
-    and indefinite matrices. :func:`factorize` of kernels replaces them, without pivots unless the
-    storage is that of ``gbtrf``; as ``factors`` they serve the matrix too."""
+    :meth:`factorize` leaves the entries: L D L^T of a positive definite matrix, pivoted LU of
+    LAPACK of others. :func:`factorize` of kernels replaces them, without pivots unless the storage
+    is that of ``gbtrf``; as ``factors`` they serve the matrix too."""
 
-    factors: Any = None  # an array of Cholesky's, or a Band
+    factors: Any = None  # a Band
 
     @classmethod
     def zeros(cls, n: int, width: int, symmetric: bool = True) -> BandMatrix:
@@ -150,8 +148,8 @@ class BandMatrix(Band):
     def factorize(self) -> BandMatrix:
         """Factorise; LinAlgError if the matrix is singular."""
         if self.symmetric:
-            self.factors, info = lapack.dpbtrf(as_lapack(self), lower=1)
-            if info == 0:
+            self.factors = Band(self.flat.copy(), *self[1:5])
+            if _cholesky(self.factors):
                 return self
         self.factors, general = None, self.general()
         if not factorize(general):
@@ -162,16 +160,13 @@ class BandMatrix(Band):
     def general(self) -> BandMatrix:
         """A copy with both halves stored."""
         out = BandMatrix.zeros(self.n, self.width, symmetric=False)
-        i, j, values = _entries(self)
-        out.flat[out.position(i, j)] = values
+        add_scaled(self, 0.0, out)
         return out
 
     def solve(self, b: Array) -> Array:
         """Solve with the factors for ``b`` (n,) or (n, k)."""
         if self.factors is None:
             self.factorize()
-        if isinstance(self.factors, np.ndarray):
-            return lapack.dpbtrs(self.factors, b, lower=1)[0]
         x = np.array(b.T, dtype=float, ndmin=2)
         solve_many(self.factors, x)
         return x.T.reshape(b.shape)
@@ -180,16 +175,12 @@ class BandMatrix(Band):
     def definite(self) -> bool:
         """True if it has factors with positive pivots."""
         known = self.factors
-        if known is None or isinstance(known, np.ndarray):
-            return known is not None
-        return self.symmetric and known.top == 0 and bool(
+        return self.symmetric and known is not None and known.top == 0 and bool(
             np.minimum.reduce(known.flat[::known.ld]) > 0.0)
 
     def pivot_values(self) -> Array:
-        """Pivots (n,) of the factors of a symmetric matrix."""
-        if isinstance(self.factors, np.ndarray):
-            return self.factors[0] ** 2
-        return self.factors.flat[::self.ld].copy()
+        """Pivots (n,) of the L D L^T factors."""
+        return self.factors.flat[::self.factors.ld].copy()
 
     def inertia(self) -> Inertia:
         """Inertia of a symmetric matrix, by Sylvester's law."""
@@ -252,30 +243,36 @@ class BandMatrix(Band):
         if self.factors is None:
             self.factorize()
         lu = self.factors
-        if isinstance(lu, np.ndarray) or lu.top == 0:
-            return -1 if int(np.sum(self.pivot_values() < 0.0)) % 2 else 1
-        exchanges = int(np.sum(lu.pivots != np.arange(self.n)))
-        return -1 if (exchanges + int(np.sum(lu.flat[lu.top::lu.ld] < 0.0))) % 2 else 1
+        odd = np.sum(lu.flat[lu.top::lu.ld] < 0.0)
+        if lu.top > 0:  # exchanges
+            odd += np.sum(lu.pivots != np.arange(self.n))
+        return -1 if odd % 2 else 1
 
     def symmetric_part(self) -> BandMatrix:
         """(A + A^T) / 2 as a symmetric band matrix."""
-        out, (i, j, values) = BandMatrix.zeros(self.n, self.width), _entries(self)
-        out.add(i, j, 0.5 * values)
-        out.add(j, i, 0.5 * values)
+        out, A = BandMatrix.zeros(self.n, self.width), self.tocsc()
+        S = sparse.tril(0.5 * (A + A.T))
+        out.flat[out.position(S.row, S.col)] = S.data
         return out
 
     def skew_size(self, sizes: Array) -> tuple[float, float]:
         """Largest |entries| of A - A^T and of A, in units of the DOF sizes (n,)."""
-        i, j, values = _entries(self)
-        A = sparse.csc_array((values * sizes[i] * sizes[j], (i, j)), shape=(self.n, self.n))
+        D = sparse.diags_array(sizes)
+        A = D @ self.tocsc() @ D
         return float(abs(A - A.T).max()), float(abs(A).max())
 
     def toarray(self) -> Array:
         return self._dense(0, self.n, 0, self.n, np.ones(self.n))
 
     def tocsc(self) -> sparse.csc_matrix:
-        i, j, values = _entries(self)
-        return sparse.coo_matrix((values, (i, j)), shape=(self.n, self.n)).tocsc()
+        n, w, stored = self.n, self.width, self.flat.reshape(-1, self.ld).T
+        if self.symmetric:
+            lower, stored = stored, np.zeros((2 * w + 1, n))
+            for k in range(w + 1):
+                stored[w - k, k:] = stored[w + k, :n - k] = lower[k, :n - k]
+        else:
+            stored = stored[self.top - w:]
+        return sparse.dia_matrix((stored, range(w, -w - 1, -1)), shape=(n, n)).tocsc()
 
 
 class Coupling:
@@ -291,20 +288,16 @@ class Coupling:
         self.band = A._replace(coupled=np.array([handle_of(self), 0], dtype=np.int64))
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, x: Array,
-                   dm: Array) -> bool:
-        """Solve in place of x (N,), or factorise if it is empty; False on failure."""
+                   dm: Array) -> None:
+        """Solve in place of x (N,), or factorise if it is empty."""
         if x.size:
             x[:] = self._lu.solve(x)
-            return True
+            return
         A, (i, j, v) = self.band, self.entries()
         A.coupled[1] = len(v) > 0
         if len(v):
-            try:
-                self._lu = splu(A.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(A.n, A.n)),
-                                "MMD_AT_PLUS_A", 0.01, options={"SymmetricMode": True})
-            except RuntimeError:
-                return False
-        return True
+            self._lu = splu(A.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(A.n, A.n)),
+                            "MMD_AT_PLUS_A", 0.01, options={"SymmetricMode": True})
 
 
 @source
@@ -312,18 +305,6 @@ def coupling(A, x):
     """Solve with the :class:`Coupling` of A in place of x, or factorise if it is empty."""
     none = x[:0]
     return call_solver(A.coupled[0], 0.0, none, none, none, none, x, none)
-
-
-def _entries(A):
-    """Rows, columns and values of a band matrix."""
-    rows, w = A.flat.reshape(-1, A.ld), A.width
-    if A.top > 0:
-        rows = rows[:, A.top - w:]
-        j, k = np.nonzero(rows)
-        return j + k - w, j, rows[j, k]
-    j, k = np.nonzero(rows[:, :w + 1])
-    i, values, below = j + k, rows[j, k], k > 0
-    return (np.append(i, j[below]), np.append(j, i[below]), np.append(values, values[below]))
 
 
 def as_lapack(A: Band) -> Array:
@@ -362,12 +343,17 @@ def factorize(A):
     if A.top > 0:
         ab[:], A.pivots[:], info = lapack.dgbtrf(ab, A.width, A.width)
         return bool(info == 0 and np.all(np.isfinite(ab[A.top])))
+    before = ab[0].copy()
+    return bool(np.all(ab[0] >= LOST * before)) if _cholesky(A) else _eliminate(ab.T, LOST)
+
+
+def _cholesky(A):
+    """L D L^T of a symmetric band in place; False if it is not positive definite."""
+    ab = as_lapack(A)
     c, info = lapack.dpbtrf(ab, lower=1)
-    if info != 0:
-        return _eliminate(ab.T, LOST)
-    before, ab[0] = ab[0].copy(), c[0] ** 2
-    ab[1:] = c[1:] / c[0]
-    return bool(np.all(ab[0] >= LOST * before))
+    if info == 0:
+        ab[0], ab[1:] = c[0] ** 2, c[1:] / c[0]
+    return info == 0
 
 
 def _eliminate(columns, lost):

@@ -1,6 +1,7 @@
 """Callbacks from kernels to Python objects: user-defined items and linear solvers. An object is
 known by a handle, a positive integer that compiled code can store."""
 
+import logging
 import signal
 import weakref
 from collections.abc import Callable, Iterator
@@ -12,7 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from .errors import NO_FACTORS
 from .source import PYTHON, apart, primitive
+
+logger = logging.getLogger(__name__)
 
 # signals such as Ctrl-C while compiled code runs
 
@@ -115,7 +119,13 @@ def custom_distance(handle, obstacle, t, x, out):
 @primitive("skfem_ancf.core.loops")
 def call_solver(handle, t, u, multipliers, R, phi, du, dm):
     """Solve the linear system with the multipliers; False on failure."""
-    return bool(owner(handle).solve_into(t, u, multipliers, R, phi, du, dm))
+    solver = owner(handle)
+    try:
+        solver.solve_into(t, u, multipliers, R, phi, du, dm)
+    except NO_FACTORS as error:
+        logger.debug("no factors: %s", error)
+        return False
+    return True
 
 
 #: Exceptions of callbacks by thread, which compiled code cannot raise.

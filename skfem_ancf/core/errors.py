@@ -26,6 +26,8 @@ from .types import Array
 
 _T = TypeVar("_T")
 
+#: Exceptions of factorisations and eigenvalue solvers.
+NO_FACTORS = np.linalg.LinAlgError, RuntimeError
 #: Warning filters are global: one thread at a time changes them.
 _FILTERS = RLock()
 

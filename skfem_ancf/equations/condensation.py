@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..beam import Beam
-from ..core.band import NO_FACTORS, SMALL, BandMatrix, Inertia
+from ..core.band import SMALL, BandMatrix, Inertia
 from ..core import Array
 from .rank import diagonal_factors
 
@@ -185,17 +185,12 @@ class Condensed:
         return x.reshape(b.shape), multipliers.reshape(phi.shape)
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                   dm: Array) -> bool:
-        """Solve, or factorise if R is empty; False on failure."""
-        try:
-            if len(R):
-                du[:], dm[:] = self.solve(R, phi)
-            else:
-                self.factorize(u, multipliers)
-        except NO_FACTORS as error:
-            logger.debug("no factors: %s", error)
-            return False
-        return True
+                   dm: Array) -> None:
+        """Solve, or factorise if R is empty."""
+        if len(R):
+            du[:], dm[:] = self.solve(R, phi)
+        else:
+            self.factorize(u, multipliers)
 
 
 class CondensedMass:
@@ -261,21 +256,16 @@ class CondensedMass:
         return (x, l) if most < REFINEMENTS else None
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                   dm: Array) -> bool:
+                   dm: Array) -> None:
         """Project velocities or accelerations R (N,) onto the joints at u and t."""
         # ``phi`` (m,) is the required change of J R. ``du`` is the displacement of the joint forces
         # on entry; the change is returned in du (N,) and dm (m,). With empty ``multipliers`` a few
         # refinements suffice, since more iterations follow.
-        try:
-            J = None
-            if self.lag or not np.array_equal(du, u):
-                J = self._condensed.nodes.derivative(du, t - self.lag)
-            du[:], dm[:] = self.solve(u, t, 0.0 * R, phi, J, float(np.linalg.norm(R)),
-                                      REFINEMENTS if len(multipliers) else ROUGHLY)
-        except NO_FACTORS as error:
-            logger.debug("no factors: %s", error)
-            return False
-        return True
+        J = None
+        if self.lag or not np.array_equal(du, u):
+            J = self._condensed.nodes.derivative(du, t - self.lag)
+        du[:], dm[:] = self.solve(u, t, 0.0 * R, phi, J, float(np.linalg.norm(R)),
+                                  REFINEMENTS if len(multipliers) else ROUGHLY)
 
 
 def _order(nodes):

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from ..core.band import (NO_FACTORS, SMALL, Band, BandMatrix, Inertia, dense, factorize, fix,
+from ..core.band import (SMALL, Band, BandMatrix, Inertia, dense, factorize, fix,
                          solve_dependent)
 from ..core import Array, cached_property, refuse
 from ..core.callbacks import handle_of
@@ -33,9 +33,17 @@ ROUGH = 1e-8
 
 
 class Last:
-    """The last factors of a matrix that is more than a band."""
+    """The last factors of a matrix that is more than a band, and its groups of equations."""
 
     factors: Alone | Schur | NullSpace | None = None
+    _of: Any = None
+
+    def blocks(self, rows: Array, columns: Array, m: int, n: int) -> list[Block]:
+        """The :func:`blocks` of J, cached."""
+        of = self._of
+        if of is None or not (np.array_equal(of[0], rows) and np.array_equal(of[1], columns)):
+            of = self._of = rows, columns, blocks(rows, columns, m, n)
+        return of[2]
 
 
 class LinearSolver:
@@ -45,7 +53,7 @@ class LinearSolver:
     def __init__(self, system: Any) -> None:
         self._system, self.handle = proxy(system), handle_of(self)
         self._at: tuple[Array, float] = np.zeros(0), 0.0
-        self._pattern, self._last = Pattern(), Last()
+        self._last = Last()
         #: True if the matrix is more than a band: multipliers, or force elements between distant
         #: nodes.
         self.coupled = bool(system.constraints.joints) or system.forces.couples_far
@@ -132,7 +140,7 @@ class LinearSolver:
                 return
             except np.linalg.LinAlgError:
                 logger.debug("the band is not definite without the joints")
-        self._last.factors = NullSpace(s.K, J, more, constraints, self._pattern)
+        self._last.factors = NullSpace(s.K, J, more, constraints, self._last)
 
     @property
     def _factors(self):
@@ -147,18 +155,13 @@ class LinearSolver:
                                    np.zeros(0) if phi is None else phi)
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                   dm: Array) -> bool:
-        """Factorise and solve within a kernel for R at free DOFs; False on failure."""
-        try:
-            self.factorize(u, t, multipliers)
-            if self.coupled:
-                du[:], dm[:] = self.solve(R, phi)
-            else:  # without detours
-                du[:] = self._system.K.solve(R)
-        except NO_FACTORS as error:
-            logger.debug("no factors: %s", error)
-            return False
-        return True
+                   dm: Array) -> None:
+        """Factorise and solve within a kernel for R at free DOFs."""
+        self.factorize(u, t, multipliers)
+        if self.coupled:
+            du[:], dm[:] = self.solve(R, phi)
+        else:  # without detours
+            du[:] = self._system.K.solve(R)
 
     def inertia(self) -> Inertia:
         """Inertia of the symmetric part of the factorised tangent at the free DOFs, on the null
@@ -278,59 +281,21 @@ def eliminated(A: Array) -> tuple[Array, Array, Array]:
     return pivots, R[:, :, :c], R[:, :, c:] / size[:, None]
 
 
-class Pattern:
-    """The sparsity pattern of a matrix, cached over iterations."""
-
-    def __init__(self) -> None:
-        self._band = np.zeros(0, bool)
-        self._of: Any = None
-        self._blocks: Any = None
-
-    def of_band(self, K: BandMatrix) -> tuple[Any, Any, Any]:
-        """Rows, columns and values of a band matrix, with zeros that were nonzero before."""
-        flat = K.flat
-        used = flat != 0.0
-        if len(self._band) != len(used):
-            self._band = used
-        elif np.any(used > self._band):
-            self._band = self._band | used
-        at, = np.nonzero(self._band)
-        j = at // K.ld
-        i = j + at % K.ld - K.top
-        below, = np.nonzero(i > j) if K.symmetric else (np.zeros(0, int),)
-        return np.append(i, j[below]), np.append(j, i[below]), np.append(flat[at], flat[at[below]])
-
-    def blocks(self, rows: Array, columns: Array, m: int, n: int) -> list[Block]:
-        """The :func:`blocks` of J, cached."""
-        of = self._blocks
-        if of is None or not (np.array_equal(of[0], rows) and np.array_equal(of[1], columns)):
-            of = self._blocks = rows, columns, blocks(rows, columns, m, n)
-        return of[2]
-
-    def csc(self, i: Array, j: Array, values: Array, n: int) -> sparse.csc_array:
-        """The matrix (n, n) of entries (k,); duplicates are summed."""
-        of = self._of
-        if of is None or len(of[0]) != len(i) or not (
-                np.array_equal(of[0], i) and np.array_equal(of[1], j)):
-            places, where = np.unique(j * np.int64(n) + i, return_inverse=True)
-            first = np.searchsorted(places, np.arange(n + 1) * np.int64(n)).astype(np.int32)
-            of = self._of = i, j, where, (places % n).astype(np.int32), first
-        data = np.bincount(of[2], values, len(of[3]))
-        return sparse.csc_array((data, of[3], of[4]), shape=(n, n))
-
-
 class NullSpace:
     """Sparse factors of ``[K, J^T; J, 0]``. ``entries`` are those of K outside of the band K;
-    ``pattern`` is the last one of the system."""
+    ``last`` has the groups of joint equations."""
 
     def __init__(self, K: BandMatrix, J: Any, entries: Any, constraints: Any,
-                 pattern: Pattern) -> None:
+                 last: Last) -> None:
         self._sizes, self._shape = s, (m, n) = constraints.coordinate_sizes, (constraints.m, K.n)
-        i, j, v = (np.append(a, b) for a, b in zip(pattern.of_band(K), entries))
-        self._K = pattern.csc(i, j, v * s[i] * s[j], n)
+        self._K = K.tocsc()
+        if len(entries[0]):
+            i, j, v = entries
+            self._K = self._K + sparse.csc_array((v, (i, j)), shape=(n, n))
+        self._K.data *= s[self._K.indices] * np.repeat(s, np.diff(self._K.indptr))
         self._groups, given = [], np.zeros(n, bool)
         rows, columns, values = J
-        for block in pattern.blocks(rows, columns, m, n):
+        for block in last.blocks(rows, columns, m, n):
             (g, k), c = block.rows.shape, block.columns.shape[1]
             A = np.bincount(block.places, (values * s[columns])[block.entries], g * k * c)
             pivots, R, M = eliminated(A.reshape(g, k, c))

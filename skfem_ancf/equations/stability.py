@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
-from ..core.band import NO_FACTORS, Inertia, fix
-from ..core import Array
+from ..core.band import Inertia, fix
+from ..core import NO_FACTORS, Array
 
 logger = logging.getLogger(__name__)
 

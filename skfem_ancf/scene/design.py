@@ -12,10 +12,9 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from ..actions.bound import derivative
-from ..core import (Array, ArrayLike, ConvergenceError, InputError, ask, ask_array, refuse,
-                    refuse_any, require_finite, require_flag, require_function, require_integer,
-                    require_module, require_option)
-from ..core.band import NO_FACTORS
+from ..core import (NO_FACTORS, Array, ArrayLike, ConvergenceError, InputError, ask, ask_array,
+                    refuse, refuse_any, require_finite, require_flag, require_function,
+                    require_integer, require_module, require_option)
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import Inverse, StrainTangent, matrices_of
 from ..results.state import State

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ..core import (Array, CallbackError, ConvergenceError, Interrupted, ask, refuse,
+from ..core import (NO_FACTORS, Array, CallbackError, ConvergenceError, Interrupted, ask, refuse,
                     require_function, require_integer, require_positive, shown)
-from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
 from ..equations.convergence import (correction_size, is_balanced, is_small, joint_gap,
                                      rules_of)

@@ -7,9 +7,9 @@ import scipy.linalg
 from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
-from ..core.band import NO_FACTORS, fix
-from ..core import (Array, ConvergenceError, InputError, ModelWarning, SupportError, refuse,
-                    require_integer, retold, warn)
+from ..core.band import fix
+from ..core import (NO_FACTORS, Array, ConvergenceError, InputError, ModelWarning, SupportError,
+                    refuse, require_integer, retold, warn)
 from ..equations.matrices import Inverse, StrainTangent, is_symmetric
 from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes

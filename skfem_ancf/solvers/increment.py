@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import Array, ConvergenceError
-from ..core.band import NO_FACTORS
+from ..core import NO_FACTORS, Array, ConvergenceError
 from ..equations import stability
 from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, joint_gap, rules_of
 from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..beam.kinematics import bent
-from ..core import (AncfError, Array, ConvergenceError, InputError, Interrupted, cached_property,
-                    require_finite, require_flag, require_integer, require_option, require_positive)
-from ..core.band import NO_FACTORS
+from ..core import (NO_FACTORS, AncfError, Array, ConvergenceError, InputError, Interrupted,
+                    cached_property, require_finite, require_flag, require_integer, require_option,
+                    require_positive)
 from ..core.progress import progress_bar
 from ..equations import stability
 from ..equations.system import System

@@ -26,8 +26,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from ..actions.contact.contacts import FIRMER, YIELDS, Contacts
 from ..actions.contact.tables import ANCHORED, BILATERAL, hardening
 from ..actions.forces.springs import Turns
-from ..core import Array
-from ..core.band import NO_FACTORS, fix
+from ..core import NO_FACTORS, Array
+from ..core.band import fix
 from ..core.callbacks import handle_of
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
                                    position_weights, potential, response, verdict)
@@ -125,16 +125,16 @@ class Descent:
         return self._passed[-1], last
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                   dm: Array) -> bool:
-        """Solve for a correction within a kernel; False on failure."""
+                   dm: Array) -> None:
+        """Solve for a correction within a kernel."""
         if np.max(np.abs(u / self._sizes)) > LOST:
-            return False
+            raise np.linalg.LinAlgError("the iteration diverges")
         self._calls += 1
         if self._calls % BACK == 0:
             self._passed.append(u.copy())
         found = self._bounded(lambda: self.system.solver.factorize(u, t, multipliers), R, phi)
         if found is None:
-            return False
+            raise np.linalg.LinAlgError("no shift suffices")
         small = (self._shift > 0.0 and np.max(np.abs(found[0] / self._sizes)) < SMALL
                  and not self.system.constraints.missing_supports)  # no rigid motion
         self._small = self._small + 1 if small else 0
@@ -158,7 +158,6 @@ class Descent:
         elif along > 0.3:
             self._radius = min(1.5 * self._radius, self._largest)
         self._before = now
-        return True
 
     def _bounded(self, factorize, R, phi):
         """The correction with the smallest shift that suffices, to a factor of ten."""
