@@ -7,7 +7,7 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.beam.kernels import CableKernel, SectionKernel, law, loops, runs
+from skfem_ancf.beam.kernels import CableKernel, SectionKernel, loops, runs, tables
 from skfem_ancf.beam.kernels.compiled import compiled_tables
 from skfem_ancf.beam.kernels.elements import Elements
 from skfem_ancf.core.switch import compiled_off
@@ -139,7 +139,7 @@ def test_loops_are_arrays(kind, mesh):
     for t in k.tables:
         x, y, ns = Elements(t), compiled_tables(t), len(t.start) * t.rows.shape[1]
         given = np.sin(np.arange(1.0, ns + 1.0))
-        eigen, linear = given, t.law.kind == law.LINEAR
+        eigen, linear = given, t.law.kind == tables.LINEAR
         if not linear:
             eigen = 1e-3 * np.cos(np.arange(3.0 * t.weights.shape[1] * len(t.start)))
         f, g, A, B, S, T = (np.zeros(n) for n in (k.N, k.N, k.N * ld, k.N * ld, ns, ns))

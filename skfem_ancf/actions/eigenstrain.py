@@ -14,9 +14,8 @@ from numpy.polynomial.legendre import legvander
 
 from ..beam import Beam, Layout, WhichBeam, has_history, remembers
 from ..beam.distribution import Distribution
-from ..beam.kernels.kernel import energy_at, strains, stresses_of
-from ..beam.kernels.histories import fibre_points
-from ..beam.kernels.law import CUSTOM, HISTORY, LINEAR, POINTWISE
+from ..beam.kernels.kernel import energy_at, fibre_points, strains, stresses_of
+from ..beam.kernels.tables import CUSTOM, HISTORY, LINEAR, POINTWISE
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.strains import on_grid, strain_at, stretched
 from ..core import (Array, InputError, TimeFunction, ask_array, refuse, require_finite_scalar,
@@ -25,7 +24,7 @@ from ..formulations import COMPONENTS
 from ..sections import Layer
 from .item import Item, takes
 from .loads import Amplitude, Load
-from .symbols import Symbol, middle
+from .places import Symbol, middle
 
 # eigenstrains of nonlinear laws
 

@@ -2,11 +2,11 @@
 
 from .masses import TURN, points_along, projected
 from .beam import Beam, reference_coordinates
-from .solid import PiolaForm, PiolaTangent, displacement_strain, moduli_at, scattered, tensor
-from .domain import Domain, DomainPoints, drawn, grade_of
+from .domain import (Domain, DomainPoints, PiolaForm, PiolaTangent, displacement_strain, drawn,
+                     grade_of, moduli_at, scattered, tensor)
 from .rigid import RigidBody, on_body
-from .layout import Layout, WhichBeam, WhichMember, select_beam, select_member
-from .points import BeamPoints, Located, PointLocator, require_body
+from .layout import (BeamPoints, Layout, Located, PointLocator, WhichBeam, WhichMember,
+                     require_body, select_beam, select_member)
 from .remembered import by_history, cable_forces, has_history, remembers, with_history
 
 __all__ = ["Beam", "RigidBody", "reference_coordinates"]

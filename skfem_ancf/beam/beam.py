@@ -68,7 +68,7 @@ class Beam(Immutable):
     element
         A beam element, such as ``ElementBeamANCF(3)``, or "auto": the element of lowest order that
         represents ``fields`` within ``tolerance``, see
-        :func:`skfem_ancf.elements.ancf.choose_element`.
+        :func:`skfem_ancf.elements.choose_element`.
     material
         A material, such as :class:`~skfem_ancf.StVenantKirchhoff`; None if the section has its own
         materials.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core import Array
-from .kernels.histories import Past
+from .kernels.kernel import Past
 from ..materials import HistoryMaterial
 
 

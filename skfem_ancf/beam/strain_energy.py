@@ -9,11 +9,10 @@ from ..core.band import add_multiple, clear
 from ..core import I1, I2, cached_property, primitive, source
 from .beam import Beam
 from .kernels.elements import Elements
-from .kernels.histories import Past, elements_of, remembering
-from .kernels.law import LINEAR
+from .kernels.kernel import Past, elements_of, remembering
+from .kernels.tables import CABLE, LINEAR, StrainTables, repeated, scaled, together
 from .kernels.runs import (run_accept, run_eigen_force, run_eigen_tangent, run_force,
                            run_linearised, run_put, run_tangent, run_unsymmetric)
-from .kernels.tables import CABLE, StrainTables, repeated, scaled, together
 
 #: Columns of the table of a body: begin and end of stresses; kind.
 BEGIN, END, KIND = range(3)

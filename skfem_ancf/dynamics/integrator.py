@@ -21,12 +21,11 @@ from ..core.packed import hints
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate
-from .collocation import Collocation
+from .schemes import Collocation, EnergyMomentum
 from .time_functions import SAMPLES, TimeFunctions, rates
 from .records import (FAILURES, Dampers, Interval, JointMotion, JointMotions, LowRankRows,
                       Matrices, Multipliers, Rule, StageWork, StepData, StepState, Vectors, Work,
                       acceleration_of_joints, drive_rate, mass_factor, solve_rows)
-from .schemes import EnergyMomentum
 from .stages import collocate, solve_for
 from .steps import factors, steps
 

@@ -10,7 +10,7 @@ from functools import partial
 from threading import RLock
 from typing import Any, NamedTuple
 
-from ..beam.kernels.law import CUSTOM, HISTORY
+from ..beam.kernels.tables import CUSTOM, HISTORY
 from ..core import cached_property, code_cache
 from ..core.callbacks import deferred, raise_kept
 from ..core.progress import announced_bar

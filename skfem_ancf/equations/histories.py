@@ -12,7 +12,7 @@ import numpy as np
 from ..actions.contact.tables import TURNS
 from ..actions.forces.system import Forces
 from ..beam import Beam, remembers, with_history
-from ..beam.kernels.histories import ElementsWithHistory, Past, history_size
+from ..beam.kernels.kernel import ElementsWithHistory, Past, history_size
 from ..core import Array, InputError
 from ..materials.history import HistoryMaterial
 

@@ -20,7 +20,7 @@ from ..core.band import (SMALL, Band, BandMatrix, Inertia, dense, factorize, fix
 from ..core import Array, cached_property, refuse
 from ..core.callbacks import handle_of
 from .condensation import Condensed, CondensedMass
-from .rank import DEPENDENT, Block, blocks, determinant_sign, diagonal_factors, inertia_of
+from .mobility import DEPENDENT, Block, blocks, determinant_sign, diagonal_factors, inertia_of
 
 logger = logging.getLogger(__name__)
 

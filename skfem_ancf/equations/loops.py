@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..beam.kernels.compiled import CompiledTables, compiled_pattern, compiled_tables
-from ..beam.kernels.law import point_of
+from ..beam.kernels.tables import point_of
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
 from ..core import F1, F3, is_builtin

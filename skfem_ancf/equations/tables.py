@@ -12,10 +12,9 @@ from ..core import F1, F2, I1, I2, Array, cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
-from ..beam.kernels.histories import remembering
-from ..beam.kernels.law import HISTORY, LINEAR
+from ..beam.kernels.kernel import remembering
+from ..beam.kernels.tables import CABLE, HISTORY, LINEAR, OF_H, linearised
 from ..beam.kernels.moments import MomentPack
-from ..beam.kernels.tables import CABLE, OF_H, linearised
 from ..core.callbacks import handle_of
 from ..core.packed import constant
 from ..actions.loads import Load

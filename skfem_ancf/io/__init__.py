@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..actions.obstacles.contact import may_touch, touching
-from ..actions.obstacles.outlines import around, outlines
+from ..actions.obstacles.shapes import around, outlines
 from ..beam import select_member
 from ..core import (InputError, StrPath, refuse, require_finite_scalar, require_flag, require_like,
                     require_module, require_option, require_path, require_text)

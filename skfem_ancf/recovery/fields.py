@@ -114,7 +114,7 @@ class Values(Mapping):
     Parameters
     ----------
     part
-        The :class:`~skfem_ancf.beam.points.BeamPoints`.
+        The :class:`~skfem_ancf.beam.layout.BeamPoints`.
     u
         Displacement of the DOFs of the part, shape (N,); for a linear solution the
         :func:`~skfem_ancf.core.linear.step` from its base.

@@ -216,7 +216,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
     Other Parameters
     ----------------
     part
-        Points of a beam, a :class:`~skfem_ancf.beam.points.BeamPoints`.
+        Points of a beam, a :class:`~skfem_ancf.beam.layout.BeamPoints`.
     recover
         Use the recovered field, see :mod:`skfem_ancf.recovery.recovered`, if there is one
         (:attr:`recovered`), and section forces from the equilibrium of the body, to the accuracy

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.obstacles.contact import touching
-from ..actions.obstacles.outlines import AROUND, around
+from ..actions.obstacles.shapes import AROUND, around
 from ..beam import WhichBeam
 from ..core import (ArrayLike, InputError, StrPath, refuse, require_flag, require_integer,
                     require_like, require_module, require_option, require_path, require_positive,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.obstacles.contact import may_touch, touching
-from ..actions.obstacles.outlines import around, outlines
+from ..actions.obstacles.shapes import around, outlines
 from ..core import (Array, ArrayLike, ConvergenceError, InputError, StrPath, SupportError, refuse,
                     require_flag, require_index, require_like, require_module, require_path,
                     require_text, shown)

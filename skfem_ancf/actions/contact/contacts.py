@@ -16,12 +16,10 @@ from ...core import Array, InputError, refuse, shown
 from .crossing import CrossingGuard, middle_of
 from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set_rates, touch_of,
                       untouched)
-from .laws import mean_pressure, potential, pressure_slope
-from .points import add_resistance
-from .poses import carried, taken_back
-from .tables import (ANCHORED, ANCHORS, AUGMENT, BEGIN, CUSTOM, END, FORCE, HEAD, NOW, POSE,
-                     POSES, PRESSURES, RATE, SETTLE, TANGENT, TINY, TURNS, ContactTables, Law, Pair,
-                     Request, SEEN as SEEN_AT, clear_table, set_clear, transition,
+from .points import add_resistance, mean_pressure, potential, pressure_slope
+from .tables import (ANCHORED, ANCHORS, AUGMENT, BEGIN, CUSTOM, END, FORCE, HEAD, NOW, POSE, POSES,
+                     PRESSURES, RATE, SEEN as SEEN_AT, SETTLE, TANGENT, TINY, TURNS, ContactTables,
+                     Law, Pair, Request, carried, clear_table, set_clear, taken_back, transition,
                      weights_of_motion)
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...core import Array
 from .gap import outline
-from .poses import taken_back
-from .tables import CUSTOM
+from .tables import CUSTOM, taken_back
 
 #: Largest number of samples of a path; number of points per batch.
 MOST_PARTS, TOGETHER = 400, 50_000

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core.callbacks import custom_distance
 from ...core import C1, F1, F2, apart, indices, source
-from .plane import dot, scaled, size, turned, vector
-from .points import SHORT
+from .points import SHORT, dot, scaled, size, turned, vector
 from .tables import CUSTOM, PAIR, TINY
 
 #: Number of parameters of a circle.

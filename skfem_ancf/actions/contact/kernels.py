@@ -18,10 +18,9 @@ from ...core.band import smallest
 from ...core import C1, F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
 from .gap import Placed, carried, distances, middles, outside, placed
-from .laws import mean_pressure, pressure_slope, return_mapping
-from .plane import cross, dot, scaled, turned, vector
 from .points import (RESPONSE, TOUCH, Touch, add_bend, add_coupling, add_resistance, by_slope,
-                     product, put, respond, spread)
+                     cross, dot, mean_pressure, pressure_slope, product, put, respond,
+                     return_mapping, scaled, spread, turned, vector)
 from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, DAMPED_TANGENT, END,
                      FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SETTLE, TINY, ContactTables,
                      Request, hardening, is_clear, pair_of, set_clear, transition)

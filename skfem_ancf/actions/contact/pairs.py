@@ -19,10 +19,9 @@ from ...core import (C1, C2, C3, F1, F2, I1, I2, MADE, apart, everywhere, indice
 from ...core.band import copy, dot as inner, largest, smallest
 from ...core.callbacks import SEARCHES, call_custom, owner
 from ..tables import least_each
-from .laws import mean_pressure, return_mapping
-from .plane import cross, dot, scaled, size, turned, vector
-from .points import (Touch, add_bend, add_coupling, add_resistance, by_slope, product, put, respond,
-                     spread)
+from .points import (Touch, add_bend, add_coupling, add_resistance, by_slope, cross, dot,
+                     mean_pressure, product, put, respond, return_mapping, scaled, size, spread,
+                     turned, vector)
 
 #: Iterations of the projection, its largest step along a facet, and how far it may leave it.
 PROJECT, FAR, LEFT = 12, 1.0, 1.5

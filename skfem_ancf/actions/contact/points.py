@@ -3,19 +3,106 @@
 A gap is a function of vectors that are affine in the degrees of freedom: the place r of a point on
 its curve and the slope t there, and, of members, the closest place c on the other curve and the
 slope T there. With the derivatives G of the gap and S of the slip by them, a pressure P and a
-friction F are the resisting forces ``F S - P G`` on the vectors. P is the mean whose work along the
-change of the gap is the change of the potential, so that energy is conserved if G times the change
-of the vectors is that of the gap. F is a spring from an anchor, limited by Coulomb's law.
+friction F are the resisting forces ``F S - P G`` on the vectors. Vectors are complex numbers.
+
+For the penetration ``a`` a point with reference area A has the potential ``k A S(a)`` with::
+
+    S(a) = (<a>^3 - <a - w>^3) / (6 w),   <a> = max(a, 0)
+
+which is ``a^2 / 2`` except for a transition of width w, and twice continuously differentiable. A
+mean between two states takes the divided difference of S: its work is the change of the potential,
+so that energy is conserved if G times the change of the vectors is that of the gap. In the
+augmented Lagrangian ``a = m - g`` with the gap g and the multiplier m over the stiffness, which is
+increased by the remaining penetration. F is a spring along the surface from an anchor to the point,
+limited by Coulomb's law.
 """
 
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...core import F1, F2, I1, MADE, indices, source
+from ...core import F1, F2, I1, MADE, indices, primitive, source
 from ..tables import add_each
-from .laws import mean_pressure, mean_pressure_slope, return_mapping
-from .plane import cross, dot, scaled, turned, vector
+from .tables import TINY
+
+
+@source
+def dot(a, b):
+    """The scalar product."""
+    return a.real * b.real + a.imag * b.imag
+
+
+@source
+def cross(a, b):
+    """The product ``a_1 b_2 - a_2 b_1``."""
+    return a.real * b.imag - a.imag * b.real
+
+
+@source
+def size(a):
+    """The length."""
+    return np.sqrt(a.real * a.real + a.imag * a.imag)
+
+
+@source
+def scaled(c, a):
+    """A multiple; Numba would multiply and divide by a complex number."""
+    return vector(c * a.real, c * a.imag)
+
+
+@source
+def turned(a):
+    """A vector turned by a right angle, ``1j a``."""
+    return vector(-a.imag, a.real)
+
+
+@primitive("skfem_ancf.core.loops")
+def vector(x, y):
+    """The vector with two components; Numba would multiply by 1j."""
+    return x + 1j * y
+
+
+@source
+def potential(a, width):
+    """S(a)."""
+    return (np.maximum(a, 0.0) ** 3 - np.maximum(a - width, 0.0) ** 3) / (6.0 * width)
+
+
+@source
+def pressure_slope(a, width):
+    """S''(a)."""
+    return (np.maximum(a, 0.0) - np.maximum(a - width, 0.0)) / width
+
+
+@source
+def mean_pressure(a, b, width):
+    """(S(b) - S(a)) / (b - a), and S'(a) for a = b, without cancellation."""
+    return (_mean_cube(a, b) - _mean_cube(a - width, b - width)) / (6.0 * width)
+
+
+@source
+def _mean_cube(a, b):
+    """(<b>^3 - <a>^3) / (b - a)."""
+    p, q = np.maximum(a, 0.0), np.maximum(b, 0.0)
+    same = np.abs(b - a) < TINY
+    share = (q - p) / (b - a + same) * (1.0 - same) + same * (a > 0.0)
+    return (p * p + p * q + q * q) * share
+
+
+@source
+def mean_pressure_slope(a, b, width, pressure):
+    """Twice the derivative of the mean by b; ``pressure`` is the mean of bilateral points."""
+    jump = b - a
+    apart = 1.0 * (np.abs(jump) > 1e-3 * (width + np.abs(a) + np.abs(b)))
+    return (pressure_slope(0.5 * (a + b), width) * (1.0 - apart)
+            + 2.0 * (mean_pressure(b, b, width) - pressure) * apart / (jump + (1.0 - apart)))
+
+
+@source
+def return_mapping(trial, limit):
+    """Friction traction from a trial traction, and 1 for sticking, 0 for slipping."""
+    return np.minimum(np.maximum(trial, -limit), limit), 1.0 * (np.abs(trial) < limit)
+
 
 #: The least square of a slope: sections have none, and levers of no length.
 SHORT = 1e-30

@@ -1,11 +1,14 @@
-"""Tables of contact with obstacles. A pair is the surface of one beam with one obstacle."""
+"""Tables of contact with obstacles. A pair is the surface of one beam with one obstacle.
+Poses of obstacles."""
+
+from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ...core import C1, F1, F2, I1, I2, Array, indices, primitive, source
 from ...core.band import largest
-from ...core import C1, F1, F2, I1, I2, indices, primitive, source
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)
@@ -163,3 +166,19 @@ def hardening(pair):
     law = pair.law
     return 1.0 + pair.firmness[0] + law.inertia * pair.common[RATE] / (
         pair.softness[0] * law.stiffness)
+
+
+def carried(pose: Array, x: Array) -> Array:
+    """Points x, shape (2, n), moved with an obstacle."""
+    return x + pose[:2, None] + _turned(pose[2], pose[3], x - pose[4:6, None])
+
+
+def taken_back(pose: Array, x: Array) -> Array:
+    """The inverse of :func:`carried`."""
+    x = x - pose[:2, None]
+    return x + _turned(pose[2], -pose[3], x - pose[4:6, None])
+
+
+def _turned(cos, sin, arm):
+    """The change of a lever (2, n); a pivot far away adds no round-off without rotation."""
+    return np.array([[cos - 1.0, -sin], [sin, cos - 1.0]]) @ arm

@@ -3,8 +3,7 @@
 from ..places import point, section
 from .base import ForceElement
 from .control import Control
-from .inertia import PointMass, RotatingFrame
-from .springs import Drag, Foundation, Spring, TorsionalSpring
+from .springs import Drag, Foundation, PointMass, RotatingFrame, Spring, TorsionalSpring
 
 __all__ = ["Control", "Drag", "ForceElement", "Foundation", "PointMass", "RotatingFrame", "Spring",
            "TorsionalSpring", "point", "section"]

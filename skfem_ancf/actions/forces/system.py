@@ -15,11 +15,10 @@ from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
-from .inertia import RotatingFrame
+from .springs import RotatingFrame, TorsionalSpring
 from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
                       RESISTING, SETTLED, TORSION, TURNED, ForceTables, element_stiffness, kinds_of,
                       of_kinds, potential, vectors_of)
-from .springs import TorsionalSpring
 
 
 #: Relative size of forces of an item that are round-off.

@@ -11,8 +11,7 @@ from ...beam import Layout, WhichBeam, select_beam
 from ...core import (Array, ModelWarning, ask_array, gauss_lobatto, refuse, require_function,
                      require_integer, require_not_negative, require_option, require_positive, warn)
 from ..contact.contacts import FIRMER, Group
-from ..contact.tables import Law
-from ..contact.poses import carried, taken_back
+from ..contact.tables import Law, carried, taken_back
 from ..forces.base import ForceElement, KernelElement
 from ..places import Vector
 from .shapes import Shape
@@ -45,7 +44,7 @@ class Obstacle(ForceElement):
     """A rigid obstacle in contact with the surface of beams: bottom, top and both ends.
 
     Each quadrature point on the surface has the pressure ``stiffness`` times penetration per
-    reference area; see :mod:`skfem_ancf.actions.contact.laws`. The surface of a cable is its axis
+    reference area; see :mod:`skfem_ancf.actions.contact.points`. The surface of a cable is its axis
     plus or minus half the height along the normal.
 
     Parameters

@@ -11,10 +11,9 @@ from ...beam import Beam, Layout
 from ...core import (Array, InputError, refuse, require_flag, require_label, require_not_negative,
                      require_positive, shown)
 from ..contact.contacts import SEEN
-from ..contact.laws import potential
+from ..contact.points import add_resistance, potential, respond
 from ..contact.pairs import (COMPONENTS, both_faced, faced, meet, pair_accept, pair_force,
                              pair_stiffness, place, stiffness_of, touch_of)
-from ..contact.points import add_resistance, respond
 from ..forces.base import ForceElement
 from ..places import Vector
 from .facets import ROUND, facets_of, rounded

@@ -14,7 +14,7 @@ from ...core import Array
 from ...core.callbacks import handle_of
 from ...core.packed import Packed
 from ..contact.pairs import APART, EDGE, ON, Candidates, PairTables, facing, together
-from ..contact.plane import cross, dot
+from ..contact.points import cross, dot
 from ..contact.tables import weights_of_motion
 from .facets import Facets
 

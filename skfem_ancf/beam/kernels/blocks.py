@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core import F1, F2, I1, I2, apart, room, shaped, source
 from .compiled import W, CompiledTables
-from .law import LINEAR, conserve, law_evaluate
-from .tables import SECTION
+from .tables import LINEAR, SECTION, conserve, law_evaluate
 
 
 @source

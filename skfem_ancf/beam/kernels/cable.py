@@ -15,10 +15,8 @@ from ...core import Array, first_order, gauss, refuse
 from ...formulations import Formulation
 from ...materials.history import HistoryMaterial
 from ...sections import Across
-from .kernel import ElementKernel, strains
-from .histories import fibres
-from .law import LINEAR, NO_LAW, law_tables
-from .tables import CABLE, OF_WEIGHTS, StrainTables, pattern_of
+from .kernel import ElementKernel, fibres, strains
+from .tables import CABLE, LINEAR, NO_LAW, OF_WEIGHTS, StrainTables, law_tables, pattern_of
 
 #: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
 #: beam; the third point has a quarter of it.

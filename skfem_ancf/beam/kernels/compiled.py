@@ -10,8 +10,8 @@ import numpy as np
 
 from ...core import F2, F3, I1, I2
 from .elements import scaled
-from .law import LawTables
-from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, Pattern, StrainTables
+from .tables import (OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, LawTables, Pattern,
+                     StrainTables)
 
 #: Number of elements together.
 W = 16

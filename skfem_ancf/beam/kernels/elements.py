@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, cached_property
-from .law import LINEAR, conserve, law_evaluate
-from .tables import CABLE, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables
+from .tables import (CABLE, LINEAR, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables, conserve,
+                     law_evaluate)
 
 #: Mode of ``take`` for valid numbers, which is the fastest.
 CLIP: Any = "clip"

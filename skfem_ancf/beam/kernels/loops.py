@@ -11,7 +11,7 @@ from .blocks import (add, add_forces_of, add_geometric, add_material, add_matric
                      moduli, place, products, put, scale_products, strains, stresses, take, times,
                      to_rows)
 from .compiled import W, CompiledTables
-from .law import LINEAR, conserve, law_evaluate
+from .tables import LINEAR, conserve, law_evaluate
 
 
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)

@@ -7,7 +7,7 @@ in :mod:`.loops` replace them."""
 import numpy as np
 
 from ...core import primitive
-from .law import HISTORY, LINEAR
+from .tables import HISTORY, LINEAR
 
 #: Marks kernels with a compiled version.
 kernel = primitive("skfem_ancf.beam.kernels.loops")

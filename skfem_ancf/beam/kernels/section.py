@@ -15,8 +15,7 @@ from ...formulations import Formulation, Term
 from ...mesh.mesh_beam import MeshBeam
 from ...sections import Across, Layer
 from .kernel import ElementKernel
-from .law import LINEAR, law_tables
-from .tables import SECTION, StrainTables, pattern_of
+from .tables import LINEAR, SECTION, StrainTables, law_tables, pattern_of
 
 #: Relative size of a modulus between samples that is round-off.
 ORTHOGONAL = 1e-14
