@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .core import (Array, ArrayLike, CallbackError, CallError, Interrupted, PickleError,
-                   SweepWarning, refuse, require_function, require_integer, require_like,
-                   require_module, require_option, shown, warn)
-from .core.progress import progress_bar
+                   SweepWarning, progress_bar, refuse, require_function, require_integer,
+                   require_like, require_module, require_option, shown, warn)
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 

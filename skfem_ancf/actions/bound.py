@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..beam import Beam, Layout
-from ..beam.distribution import Facets
+from ..beam import Beam, Facets, Layout
 from ..core import (Array, ArrayLike, InputError, cached_property, is_builtin, refuse,
                     along, require_finite, require_slope, shown, warnings_as_errors)
 from .places import Vector

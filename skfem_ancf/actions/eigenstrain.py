@@ -12,11 +12,10 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..beam import Beam, Layout, WhichBeam, has_history, remembers
-from ..beam.distribution import Distribution
+from ..beam import (Beam, Distribution, Layout, WhichBeam, element_dofs, entries_of, has_history,
+                    remembers)
 from ..beam.kernels.kernel import energy_at, fibre_points, strains, stresses_of
 from ..beam.kernels.tables import CUSTOM, HISTORY, LINEAR, POINTWISE
-from ..beam.kinematics import element_dofs, entries_of
 from ..beam.strains import on_grid, strain_at, stretched
 from ..core import (Array, InputError, TimeFunction, ask_array, refuse, require_finite_scalar,
                     require_function, retold, stress_of)

@@ -8,10 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam import Beam, Layout, WhichBeam, points_along
-from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, Sampled, groups_of,
-                                 surfaces_of)
-from ..beam.kinematics import element_dofs, entries_of
+from ..beam import (AXIS, BODY, LEFT, RIGHT, UPPER, Beam, Distribution, Layout, Sampled, WhichBeam,
+                    element_dofs, entries_of, groups_of, points_along, surfaces_of)
 from ..core import (Array, ArrayLike, InputError, NameUnknown, Place, TimeFunction, along, ask,
                     gauss, product_rule, refuse, require_finite, require_flag, require_function,
                     require_module, require_slope, retold)

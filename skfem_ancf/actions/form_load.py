@@ -11,8 +11,7 @@ from skfem.assembly import BilinearForm, FacetBasis, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from ..beam.distribution import AXIS, BODY, Distribution, Sampled, facets_along
-from ..beam import Domain, WhichMember
+from ..beam import AXIS, BODY, Distribution, Domain, Sampled, WhichMember, facets_along
 from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss, refuse,
                     require_finite, require_flag, require_slope, shown, warnings_as_errors)
 from .energy import Density, points_of

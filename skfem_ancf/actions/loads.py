@@ -9,9 +9,9 @@ from typing import Any, cast
 import numpy as np
 from scipy import sparse
 
-from ..beam import Beam, Domain, Layout, RigidBody, WhichBeam, WhichMember, on_body
-from ..beam.distribution import (AXIS, Distribution, Sampled, add_nodal, divided, on_facets,
-                                 on_points, stations_of_vector, surfaces_of)
+from ..beam import (AXIS, Beam, Distribution, Domain, Layout, RigidBody, Sampled, WhichBeam,
+                    WhichMember, add_nodal, divided, on_body, on_facets, on_points,
+                    stations_of_vector, surfaces_of)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
 from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,

@@ -7,10 +7,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..beam import TURN, Beam, Layout, PointLocator, RigidBody, WhichBeam, WhichMember, on_body
-from ..beam.distribution import Distribution, on_points
+from ..beam import (TURN, Beam, Distribution, Layout, PointLocator, RigidBody, WhichBeam,
+                    WhichMember, locate, on_body, on_points, probe_reference)
 from ..beam.kernels.section import beam_gradients
-from ..beam.kinematics import locate, probe_reference
 from ..core import (Array, ArrayLike, TimeFunction, ask, refuse, require_direction, require_finite,
                     require_finite_scalar, require_positive)
 from ..mesh.places import as_point

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.band import BandMatrix
-from ..core import Array, Rule, gauss, product_rule, tensor
+from ..core import Array, BandMatrix, Rule, gauss, product_rule, tensor
 from ..formulations import AXIS
 
 #: Additional points along an element of variable section.

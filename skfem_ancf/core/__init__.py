@@ -12,9 +12,15 @@ from .errors import (NO_FACTORS, AncfError, CallError, CallbackError, Checkpoint
                      require_point, require_positive, require_slope, require_text, require_unmasked,
                      retold, sample, shown, warn, warnings_as_errors)
 from .types import Array, ArrayLike, Law, Place, Rule, StrPath, TimeFunction
-from .immutable import (Immutable, array_cache, cached_property, is_builtin, packed, read_only,
+from .immutable import (Immutable, array_cache, cached_property, is_builtin, picklable, read_only,
                         rebuilt)
 from .quadrature import gauss, gauss_lobatto, hermite_basis, lagrange, product_rule, tensor
 from .linear import angle_of, first_order, largest, step, stress_of, unwrapped
+from .archive import output_file
+from .band import Band, BandMatrix, Inertia
+from .callbacks import (call_custom, call_solver, custom_distance, deferred, handle_of, owner,
+                        raise_kept)
+from .packed import Packed, constant, hints
+from .progress import announced_bar, progress_bar
 from .source import (C1, C2, C3, F1, F2, F3, I1, I2, I3, MADE, apart, everywhere, indices,
                      primitive, room, shaped, source, where)

@@ -28,7 +28,7 @@ class _Packed:
         return self._recipe
 
 
-def packed(value: Any) -> Any:
+def picklable(value: Any) -> Any:
     """A value for pickle: forms by the name that they share with the decorated function."""
     # Pickle takes an OrientedBoundary for a view of an array and loses the orientation.
     if isinstance(value, Form):
@@ -38,14 +38,14 @@ def packed(value: Any) -> Any:
     elif isinstance(value, OrientedBoundary):
         return _Packed(value, OrientedBoundary, (np.asarray(value), value.ori))
     elif type(value) in (tuple, list):
-        return type(value)(map(packed, value))
+        return type(value)(map(picklable, value))
     elif type(value) is dict:
-        return {name: packed(one) for name, one in value.items()}
+        return {name: picklable(one) for name, one in value.items()}
     return value
 
 
 def unpacked(value: Any) -> Any:
-    """The value of :func:`packed`, in a copy without pickle."""
+    """The value of :func:`picklable`, in a copy without pickle."""
     if type(value) in (tuple, list):
         return type(value)(map(unpacked, value))
     if type(value) is dict:
@@ -146,7 +146,7 @@ class Immutable(metaclass=_Freezing):
         return {name: value for name, value in vars(self).items() if name not in derived}
 
     def __getstate__(self):
-        return packed(self._attributes())
+        return picklable(self._attributes())
 
     def __setstate__(self, state):
         vars(self).update(unpacked(state))

@@ -12,9 +12,9 @@ import numpy as np
 from ..actions.forces.springs import Turns
 from ..actions.joints.base import Joint
 from ..beam import Domain, WhichBeam, WhichMember, require_body
-from ..core import Array, ArrayLike, Place, StrPath, refuse, require_finite, require_index
+from ..core import (Array, ArrayLike, Place, StrPath, progress_bar, refuse, require_finite,
+                    require_index)
 from ..equations.system import System
-from ..core.progress import progress_bar
 from ..io import PvdWriter, to_xarray
 from ..recovery.resultants import Resultants, over_time
 from ..results.output import history_html, report_of_history

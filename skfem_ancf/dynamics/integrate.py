@@ -12,9 +12,8 @@ import numpy as np
 
 from ..core.archive import Unreadable, read, write
 from ..core import (AncfError, Array, CheckpointError, CheckpointWarning, ConvergenceError,
-                    Interrupted, ModelWarning, StrPath, refuse, require_flag, require_function,
-                    require_integer, require_path, retold, shown, warn)
-from ..core.progress import progress_bar
+                    Interrupted, ModelWarning, StrPath, progress_bar, refuse, require_flag,
+                    require_function, require_integer, require_path, retold, shown, warn)
 from ..equations.stability import largest_displacement
 from ..equations.system import System
 from ..results.state import State

@@ -15,9 +15,8 @@ from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.obstacles.contact import may_touch
 from ..actions.tables import constraint, joint_directions
 from ..core.band import SPARE, Band, BandMatrix, Coupling, coupling, factorize, fix, solve
-from ..core.callbacks import handle_of
-from ..core import I1, Array, ConvergenceError, SupportError, refuse, require_positive
-from ..core.packed import hints
+from ..core import (I1, Array, ConvergenceError, SupportError, handle_of, hints, refuse,
+                    require_positive)
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate

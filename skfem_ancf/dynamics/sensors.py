@@ -11,10 +11,9 @@ import numpy as np
 
 from ..actions.joints.base import Joint
 from ..beam import Located, WhichBeam
-from ..core.archive import output_file
 from ..core import (Array, CallbackError, CheckpointError, Immutable, NameUnknown, StrPath,
-                    ask_array, refuse, require_flag, require_module, require_option, require_path,
-                    shown)
+                    ask_array, output_file, refuse, require_flag, require_module, require_option,
+                    require_path, shown)
 from ..equations.system import System
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State

@@ -11,9 +11,7 @@ from threading import RLock
 from typing import Any, NamedTuple
 
 from ..beam.kernels.tables import CUSTOM, HISTORY
-from ..core import cached_property, code_cache
-from ..core.callbacks import deferred, raise_kept
-from ..core.progress import announced_bar
+from ..core import announced_bar, cached_property, code_cache, deferred, raise_kept
 from ..core.switch import compiled_off, compiled_setting
 from .tables import Tables
 

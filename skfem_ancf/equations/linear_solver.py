@@ -17,8 +17,7 @@ from scipy.sparse.linalg import splu
 
 from ..core.band import (SMALL, Band, BandMatrix, Inertia, dense, factorize, fix,
                          solve_dependent)
-from ..core import Array, cached_property, refuse
-from ..core.callbacks import handle_of
+from ..core import Array, cached_property, handle_of, refuse
 from .condensation import Condensed, CondensedMass
 from .mobility import DEPENDENT, Block, blocks, determinant_sign, diagonal_factors, inertia_of
 

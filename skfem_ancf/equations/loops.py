@@ -9,9 +9,8 @@ from ..beam.kernels.compiled import CompiledTables, compiled_pattern, compiled_t
 from ..beam.kernels.tables import point_of
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
-from ..core import F1, F3, is_builtin
+from ..core import F1, F3, Packed, is_builtin
 from ..core.jit import address, caller, compiled, reader
-from ..core.packed import Packed
 from ..actions.contact.pairs import Candidates, PairTables
 from ..actions.contact.tables import Pair
 from .tables import Equations

@@ -16,10 +16,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
 from ..actions.forces.kernels import add_elastic_force
-from ..beam.kinematics import element_dofs, entries_of
+from ..beam import element_dofs, entries_of
 from ..beam.strain_energy import body_tangent
-from ..core import Array, ConvergenceError, InputError, SupportError
-from ..core.band import BandMatrix
+from ..core import Array, BandMatrix, ConvergenceError, InputError, SupportError
 from .condensation import Condensed
 from .system import System
 

@@ -19,10 +19,8 @@ from ..actions.joints.base import UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..actions.tables import MATERIALS, carry_eigenstrains
-from ..beam import Beam, Domain, PointLocator, RigidBody
-from ..beam.kinematics import bent
-from ..core import Array, cached_property, refuse
-from ..core.band import BandMatrix
+from ..beam import Beam, Domain, PointLocator, RigidBody, bent
+from ..core import Array, BandMatrix, cached_property, refuse
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
 from . import evaluation

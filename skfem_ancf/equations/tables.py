@@ -7,16 +7,13 @@ from weakref import proxy, ref
 
 import numpy as np
 
-from ..core.band import Band
-from ..core import F1, F2, I1, I2, Array, cached_property
+from ..core import F1, F2, I1, I2, Array, Band, cached_property, constant, handle_of
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.kernel import remembering
 from ..beam.kernels.tables import CABLE, HISTORY, LINEAR, OF_H, linearised
 from ..beam.kernels.moments import MomentPack
-from ..core.callbacks import handle_of
-from ..core.packed import constant
 from ..actions.loads import Load
 from ..actions.tables import JointTables, LoadTables
 

@@ -40,8 +40,7 @@ from skfem.element import DiscreteField
 from skfem.helpers import dot
 
 from ..actions.energy import Energy, points_of
-from ..beam.kinematics import element_dofs
-from ..beam import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
+from ..beam import PiolaForm, PiolaTangent, element_dofs, moduli_at, scattered, tensor
 from ..core import (Array, ArrayLike, ask_field, refuse, require_finite, require_like,
                     require_positive)
 from ..formulations import get_formulation

@@ -12,9 +12,8 @@ import numpy as np
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.shapes import around, outlines
 from ..beam import select_member
-from ..core import (InputError, StrPath, refuse, require_finite_scalar, require_flag, require_like,
-                    require_module, require_option, require_path, require_text)
-from ..core.archive import output_file
+from ..core import (InputError, StrPath, output_file, refuse, require_finite_scalar, require_flag,
+                    require_like, require_module, require_option, require_path, require_text)
 from ..recovery.fields import FIELDS, find_fields, unit_of, units_of
 from ..recovery.grids import COMPONENTS, body_of, facts_of, grids, in_space
 

@@ -15,7 +15,7 @@ from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
 from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, StrPath, archive,
-                    cached_property, is_builtin, packed, refuse, refuse_any, require_finite,
+                    cached_property, is_builtin, picklable, refuse, refuse_any, require_finite,
                     require_finite_scalar, require_function, require_integer, require_moderate,
                     require_option, require_options, require_path, require_positive,
                     require_unmasked, retold)
@@ -361,7 +361,7 @@ class MeshBeam(NumberedMesh):
         return out
 
     def __getstate__(self):
-        return packed({field.name: getattr(self, field.name) for field in fields(self)})
+        return picklable({field.name: getattr(self, field.name) for field in fields(self)})
 
     # topology
 

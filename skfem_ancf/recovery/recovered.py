@@ -31,8 +31,7 @@ import numpy as np
 import scipy
 from scipy.linalg.lapack import dgttrf, dgttrs, dpttrf, dpttrs
 
-from ..beam.distribution import AXIS, SNAP
-from ..beam import remembers
+from ..beam import AXIS, SNAP, remembers
 from ..beam.strains import on_grid, stress_at
 from ..core import Array, angle_of, cached_property, first_order, largest, unwrapped
 from ..formulations import EnhancedContinuum

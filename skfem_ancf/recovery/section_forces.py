@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial.chebyshev import chebint, chebvander
 
-from ..beam import Beam
-from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
+from ..beam import AXIS, BODY, SNAP, Beam, Sampled, station_of_node
 from ..core import AncfError, Array, cached_property, gauss, lagrange
 from ..mesh.mapping import MappingBeam, cross
 from ..sections.across import EDGE, off_ends, jumps, pieces

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..actions.contact.contacts import YIELDS
 from ..actions.joints.weld import PrescribedDisplacement
-from ..beam import Beam, kinematics
-from ..beam.distribution import SNAP
+from ..beam import SNAP, Beam, kinematics
 from ..beam.kinematics import tangents
 from ..core import Array, ModelWarning, StabilityWarning, warn
 from ..equations.evaluation import RANGE

@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..beam import Beam, Domain, Layout, WhichMember, select_member
-from ..core import (AncfError, Array, CallbackError, InputError, StrPath, require_flag,
+from ..core import (AncfError, Array, CallbackError, InputError, StrPath, output_file, require_flag,
                     require_integer, require_path, require_text)
-from ..core.archive import output_file
 from ..io import save_vtu, to_xarray
 from ..recovery.fields import DRAWN, find_field, no_value, unit_in, units_of, values_on_grid
 from ..recovery.grids import layout, values_of_domain

@@ -16,9 +16,9 @@ from ..actions.forces.springs import spring_force, spring_of
 from ..actions.item import Item
 from ..actions.joints.base import Joint
 from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
-from ..beam import (Beam, BeamPoints, Domain, DomainPoints, RigidBody, WhichBeam, WhichMember,
-                    require_body, select_beam, select_member)
-from ..beam.distribution import Distribution, Sampled, station_of_node, stations_of_vector
+from ..beam import (Beam, BeamPoints, Distribution, Domain, DomainPoints, RigidBody, Sampled,
+                    WhichBeam, WhichMember, require_body, select_beam, select_member,
+                    station_of_node, stations_of_vector)
 from ..core import (Array, Immutable, NearMisses, Place, cached_property, first_order, refuse,
                     require_flag, require_integer, require_option, step)
 from ..equations.evaluation import UNSEEN

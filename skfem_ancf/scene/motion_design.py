@@ -14,7 +14,7 @@ from scipy.sparse.linalg import lsqr
 
 from ..actions.bound import BoundConstraint, BoundForce, MemberForce
 from ..actions.tables import mean_external_force
-from ..beam.kinematics import element_dofs, entries_of
+from ..beam import element_dofs, entries_of
 from ..core import (Array, ArrayLike, refuse, require_flag, require_integer, require_option,
                     require_positive)
 from ..dynamics import GeneralizedAlpha, get_scheme

@@ -12,9 +12,8 @@ import numpy as np
 from ..actions.forces.springs import Turns
 from ..actions.obstacles.obstacle import stiffest
 from ..core import (Array, ArrayLike, ConvergenceError, Immutable, InputError, Interrupted,
-                    ModelWarning, refuse, require_finite, require_flag, require_increasing,
-                    require_integer, require_option, require_positive, warn)
-from ..core.progress import progress_bar
+                    ModelWarning, progress_bar, refuse, require_finite, require_flag,
+                    require_increasing, require_integer, require_option, require_positive, warn)
 from ..dynamics.base import COLUMNS, Motion, Scheme
 from ..dynamics.history import History, state_of
 from ..dynamics.sensors import Recorder, Sensor

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ..core import (NO_FACTORS, Array, CallbackError, ConvergenceError, Interrupted, ask, refuse,
-                    require_function, require_integer, require_positive, shown)
-from ..core.progress import progress_bar
+from ..core import (NO_FACTORS, Array, CallbackError, ConvergenceError, Interrupted, ask,
+                    progress_bar, refuse, require_function, require_integer, require_positive,
+                    shown)
 from ..equations.convergence import (correction_size, is_balanced, is_small, joint_gap,
                                      rules_of)
 from ..equations.evaluation import invert

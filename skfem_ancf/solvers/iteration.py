@@ -10,8 +10,7 @@ import numpy as np
 from ..actions.contact.tables import is_clear
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
-from ..core.callbacks import call_solver
-from ..core import F1, MADE, Array, apart, indices, source
+from ..core import F1, MADE, Array, apart, call_solver, indices, source
 from ..equations.convergence import (FEWEST, NEVER, correction_size, diverges, is_at_rest,
                                      is_balanced, is_small)
 from ..equations.tables import Equations

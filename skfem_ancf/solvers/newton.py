@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.kinematics import bent
+from ..beam import bent
 from ..core import (NO_FACTORS, AncfError, Array, ConvergenceError, InputError, Interrupted,
-                    cached_property, require_finite, require_flag, require_integer, require_option,
-                    require_positive)
-from ..core.progress import progress_bar
+                    cached_property, progress_bar, require_finite, require_flag, require_integer,
+                    require_option, require_positive)
 from ..equations import stability
 from ..equations.system import System
 from . import strategies

@@ -26,9 +26,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from ..actions.contact.contacts import FIRMER, YIELDS, Contacts
 from ..actions.contact.tables import ANCHORED, BILATERAL, hardening
 from ..actions.forces.springs import Turns
-from ..core import NO_FACTORS, Array
+from ..core import NO_FACTORS, Array, handle_of
 from ..core.band import fix
-from ..core.callbacks import handle_of
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
                                    position_weights, potential, response, verdict)
 from ..equations.system import System

@@ -11,10 +11,9 @@ import numpy as np
 from ..actions.obstacles.contact import touching
 from ..actions.obstacles.shapes import AROUND, around
 from ..beam import WhichBeam
-from ..core import (ArrayLike, InputError, StrPath, refuse, require_flag, require_integer,
-                    require_like, require_module, require_option, require_path, require_positive,
-                    require_text, retold)
-from ..core.archive import output_file
+from ..core import (ArrayLike, InputError, StrPath, output_file, refuse, require_flag,
+                    require_integer, require_like, require_module, require_option, require_path,
+                    require_positive, require_text, retold)
 from ..recovery.fields import FIELDS, unit_of, units_of
 from ..recovery.grids import layout
 from .scenery import (BODIES, GHOST, INK, LOAD, MUTED, RIGID, WALL, WIDE, Scenery, Sketch, rounded,

@@ -11,10 +11,9 @@ import numpy as np
 
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.shapes import around, outlines
-from ..core import (Array, ArrayLike, ConvergenceError, InputError, StrPath, SupportError, refuse,
-                    require_flag, require_index, require_like, require_module, require_path,
-                    require_text, shown)
-from ..core.archive import output_file
+from ..core import (Array, ArrayLike, ConvergenceError, InputError, StrPath, SupportError,
+                    output_file, refuse, require_flag, require_index, require_like, require_module,
+                    require_path, require_text, shown)
 from ..recovery.fields import FIELDS, find_fields
 from ..recovery.grids import CELL_TYPES, COMPONENTS, body_of, facts_of, grids, in_space
 from .matplotlib import colormap, pixels

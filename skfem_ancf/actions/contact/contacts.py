@@ -10,9 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.band import Band
-from ...core.callbacks import handle_of
-from ...core import Array, InputError, refuse, shown
+from ...core import Array, Band, InputError, handle_of, refuse, shown
 from .crossing import CrossingGuard, middle_of
 from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set_rates, touch_of,
                       untouched)

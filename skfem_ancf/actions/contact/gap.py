@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.callbacks import custom_distance
-from ...core import C1, F1, F2, apart, indices, source
+from ...core import C1, F1, F2, apart, custom_distance, indices, source
 from .points import SHORT, dot, scaled, size, turned, vector
 from .tables import CUSTOM, PAIR, TINY
 

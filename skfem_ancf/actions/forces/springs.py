@@ -10,10 +10,9 @@ import numpy as np
 import scipy
 from scipy import sparse
 
-from ...beam import Beam, Layout, RigidBody, WhichBeam, WhichMember, on_body, select_beam
-from ...beam.distribution import AXIS, Facets, groups_of, surfaces_of
+from ...beam import (AXIS, Beam, Facets, Layout, RigidBody, WhichBeam, WhichMember, groups_of,
+                     on_body, probe_reference, select_beam, surfaces_of)
 from ...beam.kernels.section import beam_gradients
-from ...beam.kinematics import probe_reference
 from ...core import (Array, ArrayLike, InputError, Place, ask_number, gauss, refuse, require_finite,
                      require_finite_scalar, require_flag, require_function, require_integer,
                      require_not_negative, shown)

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ...core import Array
-from ...core.callbacks import handle_of
-from ...core.packed import Packed
+from ...core import Array, Packed, handle_of
 from ..contact.pairs import APART, EDGE, ON, Candidates, PairTables, facing, together
 from ..contact.points import cross, dot
 from ..contact.tables import weights_of_motion
