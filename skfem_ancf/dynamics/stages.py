@@ -17,7 +17,8 @@ from ..core.band import (SPARE, add_multiple, clear, copy, factorize, factorize_
                          fix_stored, multiply, solve, solve_complex, solve_dependent, solve_joined)
 from ..core import indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
-                                     SINGULAR, correction_size, judged, noise_of_step)
+                                     SINGULAR, correction_size, judged, motion_size,
+                                     noise_of_step)
 from .records import (ITERATIONS, JointMotion, acceleration_of_joints, add_damping,
                       damping_force, drive_rate, row_of, settle)
 
@@ -254,7 +255,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     for k in range(method.values.shape[1]):
         a, b = method.values[0, k], method.values[1, k]
         largest = max(largest, (a * a + b * b) / (s.h * s.h))
-    reference = np.sqrt(state.energy[0])
+    reference = motion_size(state.energy[0])
     noise = noise_of_step(rule, 1.0, largest, abs(np.dot(u0, scratch)))
     state.fresh[0], state.correction[0] = 0, -1.0
     if state.mixed_steps[0] > 0:
@@ -273,7 +274,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         for k in range(n):
             _residual(e, matrices, method, s, w, state, step, k)
         state.iterations[0] += n
-        if not _correct(e.free, method, s, w, state):
+        if not _correct(e, method, s, w, state):
             state.failure[0] = DEPENDENT
             return False
         status = judged(state, rule.tol, reference, noise, REUSED, MIXED, False)
@@ -503,11 +504,10 @@ def _residual(e, matrices, method, s, w, state, step, k):
 
 
 @source
-def _correct(free, method, s, w, state):
+def _correct(e, method, s, w, state):
     """Correct Z and the multipliers; R becomes the correction. False for dependent joints."""
     # V is used as work array.
-    n, N, m, b, work, closing = (method.points.size, free.size, w.l.shape[1], w.J.shape[0], 0.0,
-                                 0.0)
+    n, N, m, b = method.points.size, e.free.size, w.l.shape[1], w.J.shape[0]
     D, dl, x, y, r, q = w.V, w.dl, w.x[0], w.x[1], w.r, w.q
     clear(flat_points(D))
     clear(flat_points(dl))
@@ -528,14 +528,16 @@ def _correct(free, method, s, w, state):
             for l in range(m):
                 dl[j, l] += c * r[l] - d * r[b + l]
     for j in range(n):
-        Z, R, d, l, share = w.Z[j], w.R[j], D[j], w.l[j], dl[j]
-        work += np.dot(d, R)
+        gap, l, share = w.gaps[j], w.l[j], dl[j]
         for a in range(m):
-            closing += abs(np.dot(w.J[a], d) * share[a])
+            gap[a] = np.dot(w.J[a], D[j])  # that the correction closes
             l[a] += share[a]
+    state.last_correction[0] = state.correction[0]
+    state.correction[0] = correction_size(e, flat_points(w.R), flat_points(D),
+                                          flat_points(w.gaps), flat_points(dl))
+    for j in range(n):
+        Z, R, d = w.Z[j], w.R[j], D[j]
         for i in indices(N):
             Z[i] += d[i]
             R[i] = d[i]
-    state.last_correction[0] = state.correction[0]
-    state.correction[0] = correction_size(work, closing)
     return True

@@ -31,7 +31,7 @@ from ..core import F1, apart, indices, room, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, EXPECTED, FAILED, GO_ON, LASTING, MIXED,
                                      NOT_CONVERGED, RESTART, REUSED, ROUGH, SINGULAR, SLOW,
                                      SYMMETRIC, UNSETTLED, UNSYMMETRIC, correction_size,
-                                     judged, noise_of_step)
+                                     judged, motion_size, noise_of_step)
 from .records import (ALL, AUGMENTED, ITERATIONS, acceleration_of_joints, add_damping,
                       damping_force, drive_rate, factorize_rows, settle, solve_rows, step_of)
 
@@ -475,7 +475,7 @@ def _predict(e, matrices, rule, s, w, state, limits):
     free_velocity(e.free, rule, s, w)
     energy = max(state.energy[0], kinetic_energy(matrices.M, w.x.v, w.x.scratch))
     inertia = 2.0 * abs(kinetic_energy(matrices.M, u, w.x.scratch))
-    limits[0] = np.sqrt(energy)
+    limits[0] = motion_size(energy)
     limits[1] = noise_of_step(rule, s.stiffness_factor, s.mass_factor, inertia)
 
 
@@ -492,7 +492,7 @@ def _start(e, matrices, rule, s, w, state):
 @apart("motion", *ALL, bool, returns=int)
 def _correct(e, matrices, rule, s, w, state, anew):
     """Correct u and the multipliers; FAILED for dependent joints."""
-    u, R, du, scratch = w.x.u, w.x.residual, w.x.du, w.x.scratch
+    u, R, du = w.x.u, w.x.residual, w.x.du
     l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, factors(matrices, state), matrices.rows
     state.iterations[0] += 1
     for i in indices(u.size):
@@ -500,7 +500,6 @@ def _correct(e, matrices, rule, s, w, state, anew):
         du[i] = R[i]
     if rule.solver == 0:
         solve_rows(A, rows, du)
-    work, closing = dot(R, du), 0.0
     if l.size > 0:
         constraint(e.joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
         for k in indices(l.size):
@@ -520,17 +519,12 @@ def _correct(e, matrices, rule, s, w, state, anew):
         if not good:
             state.failure[0] = DEPENDENT
             return FAILED
-        for i in indices(u.size):
-            scratch[i] = np.abs(R[i] * du[i])
-        work = dot(scratch, e.free)
         for k in indices(l.size):
             l[k] += dl[k]
-            phi[k] = np.abs(phi[k] * dl[k])
-        closing = np.sum(phi)
     for i in indices(u.size):
         u[i] += du[i]
     state.last_correction[0], state.correction[0] = (
-        state.correction[0], correction_size(work, closing))
+        state.correction[0], correction_size(e, R, du, phi, dl))
     return GO_ON
 
 

@@ -2,8 +2,8 @@
 
 A correction du of the displacement, and dl of the multipliers of joints, solves the linearised
 equations for the residuals R and phi. Its size is the root of its work,
-``sqrt(|R . du| + |phi . dl|)``, an energy norm in which units do not matter. An iteration has
-converged when
+``sqrt(|R . du| + |phi . dl|)``, an energy norm in which units do not matter
+(:func:`correction_size`). An iteration has converged when
 
 1. the error that the last correction leaves, estimated as its size times the contraction of the
    last corrections, is at most ``tol * reference`` plus round-off (:func:`is_small`),
@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core import Array, source
+from ..core.band import dot
 
 # the rule
 
@@ -32,10 +33,29 @@ CLOSED = 1e-12
 EPS = 2.2e-16
 
 
+# All iterations measure by the next three. ``e`` are the Equations: other norms than that of the
+# energy need the sizes of DOFs, and of joints.
+
+
 @source
-def correction_size(work, joints):
-    """Size of a correction from its work on the residuals of forces and, >= 0, of joints."""
-    return np.sqrt(abs(work) + joints)
+def correction_size(e, R, du, phi, dm):
+    """Size of the corrections du (N,) and dm (m,) for the residuals R and phi."""
+    work = abs(dot(R, du))
+    if phi.size > 0:
+        work += abs(dot(phi, dm))
+    return np.sqrt(work)
+
+
+@source
+def force_size(e, force, load, u):
+    """Size of an equilibrium, or of its change: that of the larger force (N,), displaced by u."""
+    return np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
+
+
+@source
+def motion_size(energy):
+    """Size of a motion of this energy."""
+    return np.sqrt(energy)
 
 
 @source

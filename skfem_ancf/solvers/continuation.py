@@ -13,8 +13,8 @@ import scipy
 from ..core import (NO_FACTORS, Array, CallbackError, ConvergenceError, Interrupted, ask,
                     progress_bar, refuse, require_function, require_integer, require_positive,
                     shown)
-from ..equations.convergence import (correction_size, is_balanced, is_small, joint_gap,
-                                     rules_of)
+from ..equations.convergence import (correction_size, force_size, is_balanced, is_small,
+                                     joint_gap, rules_of)
 from ..equations.evaluation import invert
 from ..equations.stability import position_weights
 from ..equations.system import System
@@ -280,7 +280,7 @@ class Tracer:
                 ds: float) -> Point:
         """Iterate from ``start`` and first increments of u, multipliers and load."""
         # ``increment`` gives the next one of the load.
-        system, weights = self.system, self.weights
+        system, weights, e = self.system, self.weights, self.system.backend.tables.plain
         u, m, load = start.u, start.multipliers, start.load
         _, stresses = system.assemble(u, load)
         du, dm, dl = first
@@ -296,8 +296,9 @@ class Tracer:
             residual, phi = load * external - force, system.constraints.constraint(u, load)
             if system.constraints.joints:
                 residual = residual - m @ system.constraints.full_jacobian(u, load)
-            reference = np.sqrt(max(abs(force @ u), abs(load * (external @ u)),
-                                    abs(external @ step * dl)))
+            pull = dl * external
+            reference = max(force_size(e, force, load * external, u),
+                            force_size(e, pull, pull, step))
             contraction = work / before if 0.0 < work < before else 1.0
             if is_small(work, contraction, rules.tol, reference, rules.noise) and self._balanced(
                     residual, phi, force, load * external):
@@ -316,8 +317,9 @@ class Tracer:
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise LoadStepFailed("the iteration leaves the path")
             before = work if k > 1 else 0.0
-            work = correction_size(abs((residual * system.constraints.free) @ du) + abs(phi @ dm),
-                                   abs(dl * (external @ du)))
+            pull = dl * external  # the load is an unknown too
+            work = np.hypot(correction_size(e, residual * e.free, du, phi, dm),
+                            force_size(e, pull, pull, du))
         raise LoadStepFailed(f"no convergence in {rules.iterations} iterations")
 
 

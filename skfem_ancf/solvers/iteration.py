@@ -11,8 +11,8 @@ from ..actions.contact.tables import is_clear
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
 from ..core import F1, MADE, Array, apart, call_solver, indices, source
-from ..equations.convergence import (FEWEST, NEVER, correction_size, diverges, is_at_rest,
-                                     is_balanced, is_small)
+from ..equations.convergence import (FEWEST, NEVER, correction_size, diverges, force_size,
+                                     is_at_rest, is_balanced, is_small)
 from ..equations.tables import Equations
 from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, LOAD, MOVED,
                                     RESIDUAL, U, UNSEEN, Target, balance, examine, hold_back)
@@ -197,7 +197,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             good = _solve(e, target, loose, x, m)
         before, work = work, np.inf
         if good:
-            work = correction_size(dot(R, du), abs(dot(phi, dm)))
+            work = correction_size(e, R, du, phi, dm)
         if not work < 1e300:
             return SINGULAR, k + 1, k, False, UNSEEN
         if moving:
@@ -207,7 +207,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         moving = False
         add_multiple(1.0, du, u)
         add_multiple(1.0, dm, multipliers)
-        reference = np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
+        reference = force_size(e, force, load, u)
         works[k] = work / reference if reference > 0.0 else 0.0
         k += 1
         if rules.give_up > NEVER and diverges(rules.give_up, k - 1, works[k - 1]):
