@@ -201,7 +201,7 @@ def _bend(tracer, a, b, ds):
 class Tracer:
     """Corrector and tangent of the equilibrium path of a system."""
 
-    def __init__(self, system: System, tol: float, max_iterations: int) -> None:
+    def __init__(self, system: System, tol: float = 1e-8, max_iterations: int = 15) -> None:
         self.whole, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
         #: after the history of the last point
         self.system = system

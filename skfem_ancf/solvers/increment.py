@@ -92,7 +92,7 @@ class Increment:
             if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
                 raise Unstable("the equilibrium found is unstable", found)
             if (start.rejected and route.proportional and start.load > 0.0
-                    and not strategies.heads_on(system, start, found.u, self.level)):
+                    and not strategies.heads_on(system, start, found.u)):
                 raise Unstable("the equilibrium found lies on the side away from the load", found)
             return found
 

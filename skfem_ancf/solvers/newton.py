@@ -372,7 +372,7 @@ class Search:
                 system.after(result.memory), result.u, result.multipliers):
             self._loose, self._unstabilised = "", self._unstabilised + 1
             try:  # from the last factors
-                for v, _ in strategies.Descent(system).directions(1):
+                if (v := strategies.Descent(system).lowest_direction()) is not None:
                     self._loose = stability.motion_in_words(system, result.u, v)
             except NO_FACTORS:
                 pass

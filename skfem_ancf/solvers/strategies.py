@@ -31,6 +31,7 @@ from ..core.band import fix
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
                                    position_weights, potential, response, verdict)
 from ..equations.system import System
+from .continuation import Point, Tracer
 from .iteration import Equilibrium, LoadStepFailed, StaticResult
 
 logger = logging.getLogger(__name__)
@@ -59,24 +60,18 @@ BACK, ONWARD, AWAY = 50, 0.5, 0.01
 HALVED = 8
 
 
-def heads_on(system: System, start: StaticResult, u: Array, load: float) -> bool:
+def heads_on(system: System, start: StaticResult, u: Array) -> bool:
     """True if ``u`` lies on the side of the last equilibrium to which the load increment points."""
     # Close to a bifurcation an iteration may jump to the other side. The displacement is compared
-    # with that of the tangent; moving obstacles are not tested.
+    # with the tangent of the path; moving obstacles are not tested.
     if system.forces.contacts.moving:
         return True  # the tangent has no motion of obstacles
-    du, constraints, solver = np.zeros(system.N), system.constraints, system.solver
-    du[constraints.fixed] = constraints.values(load) - start.u[constraints.fixed]
-    force, _ = system.assemble(start.u, start.load)
-    J = constraints.full_jacobian(start.u, load)
-    residual = (load * system.external_force(start.u) - force - solver.multiply(du)
-                - start.multipliers @ J)
+    point = Point(system, start.u, start.multipliers, start.load, start.u)
     try:
-        solver.factorize(start.u, load, start.multipliers)
-        du += solver.solve(residual, -constraints.constraint(start.u, load) - J @ du)[0]
-    except NO_FACTORS:
+        ahead = Tracer(system).set_tangent(point).tangent
+    except LoadStepFailed:
         return True
-    return bool(du @ (position_weights(system) * (u - start.u)) >= 0.0)
+    return bool(ahead @ (position_weights(system) * (u - start.u)) >= 0.0)
 
 
 def near_limit(system: System, start: StaticResult) -> bool:
@@ -206,31 +201,30 @@ class Descent:
         """Scalar product of nodal displacements (N,)."""
         return float(a @ (self._weights * b))
 
-    def directions(self, count: int) -> list[tuple[Array, float]]:
-        """Directions v with v . K v < 0, and the eigenvalues: pairs, the most negative first."""
-        # They are eigenvectors of K^-1 on the nodal positions.
-        inverse, values, Y = self._inverse_eigenvectors(count, "SA")
-        return [(inverse(y), value) for y, value in zip(Y.T, values) if value < 0]
+    def lowest_direction(self) -> Array | None:
+        """The direction v (N,) of the most negative ``v . K v``, from the factors, or None."""
+        value, v = self._extreme("SA")
+        return v if value < 0.0 else None
 
     def compliance(self) -> float:
         """The largest nodal displacement for unit forces, from the factors."""
-        values = self._inverse_eigenvectors(1, "LA")[1]
-        return float(np.max(values, initial=0.0))
+        return max(0.0, self._extreme("LA")[0])
 
-    def _inverse_eigenvectors(self, count, which):
+    def _extreme(self, which):
+        """The smallest ("SA") or largest ("LA") eigenvalue of K^-1 on the nodal positions, and the
+        displacement (N,) by its vector of forces."""
         at, inverse = inverse_on_positions(self.system)
-        count = min(count, len(at))
-        if not count:
-            return inverse, np.zeros(0), np.zeros((0, 0))
+        if not len(at):
+            return 0.0, np.zeros(self.system.N)
         if len(at) <= DENSE:
             G = np.array([inverse(y)[at] for y in np.eye(len(at))])
             values, Y = np.linalg.eigh(0.5 * (G + G.T))
-            some = slice(count) if which == "SA" else slice(len(at) - count, None)
-            return inverse, values[some], Y[:, some]
-        G = LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
-        start = G @ np.random.default_rng(0).standard_normal(len(at))
-        values, Y = eigsh(G, k=min(count, len(at) - 1), which=which, v0=start)
-        return inverse, values, Y
+        else:
+            G = LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
+            start = G @ np.random.default_rng(0).standard_normal(len(at))
+            values, Y = eigsh(G, k=1, which=which, v0=start)
+        k = 0 if which == "SA" else -1
+        return float(values[k]), inverse(Y[:, k])
 
 
 def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
@@ -251,7 +245,7 @@ def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
             logger.info("no descent at load %.6g: %s", level, failure)
             continue
         if (not options.route.proportional or start.load == 0.0
-                or heads_on(system, start, found.u, level)):
+                or heads_on(system, start, found.u)):
             return found, descent.saw_unstable
         first = (found, descent.saw_unstable) if first[0] is None else first
     return first
@@ -271,10 +265,9 @@ def descend(increment: Any, iterate: Callable[..., Equilibrium],
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
             return found
         descent.saw_unstable = True
-        directions = descent.directions(1)
-        if not directions:  # the unstable direction does not move the nodes
+        v = descent.lowest_direction()
+        if v is None:  # the unstable direction does not move the nodes
             break
-        v = directions[0][0]
         v = KICK * system.size / np.max(np.abs(v)) * v
         u = u + _side(system, descent, v, u, start.u, load) * v
     raise LoadStepFailed("no stable equilibrium found along the unstable directions")
