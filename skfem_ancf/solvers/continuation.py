@@ -284,7 +284,7 @@ class Tracer:
         u, m, load = start.u, start.multipliers, start.load
         _, stresses = system.assemble(u, load)
         du, dm, dl = first
-        step, work, before, rules = np.zeros(system.N), np.inf, 0.0, self.rules
+        step, work, before, rules, none = np.zeros(system.N), np.inf, 0.0, self.rules, np.zeros(0)
         for k in range(1, rules.iterations + 1):
             independent = system.linearised_stress(u, stresses, du)
             u, m, load, step = u + du, m + dm, load + dl, step + du
@@ -296,9 +296,8 @@ class Tracer:
             residual, phi = load * external - force, system.constraints.constraint(u, load)
             if system.constraints.joints:
                 residual = residual - m @ system.constraints.full_jacobian(u, load)
-            pull = dl * external
             reference = max(force_size(e, force, load * external, u),
-                            force_size(e, pull, pull, step))
+                            correction_size(e, dl * external, step, none, none))
             contraction = work / before if 0.0 < work < before else 1.0
             if is_small(work, contraction, rules.tol, reference, rules.noise) and self._balanced(
                     residual, phi, force, load * external):
@@ -317,9 +316,8 @@ class Tracer:
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise LoadStepFailed("the iteration leaves the path")
             before = work if k > 1 else 0.0
-            pull = dl * external  # the load is an unknown too
             work = np.hypot(correction_size(e, residual * e.free, du, phi, dm),
-                            force_size(e, pull, pull, du))
+                            correction_size(e, dl * external, du, none, none))  # of the load
         raise LoadStepFailed(f"no convergence in {rules.iterations} iterations")
 
 
