@@ -159,6 +159,22 @@ def test_points_across_are_as_many_as_asked():
     assert 5e-3 < worst[0] < 1e-2 and 2e-2 < worst[1] < 6e-2 and worst[2] < 4e-3
 
 
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(3)], ids=name)
+def test_a_slender_strip_below_yield_is_solved_as_an_elastic_one(element):
+    """The first correction strains it far beyond yield; the equilibrium does not yield."""
+    def tip(material):
+        beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 17), height=H), element, material,
+                    width=B)
+        scene = Scene(beam).clamp("left", thickness="free")
+        return scene.point_force((0.0, -0.7 * M_Y), at="right").solve_static()
+
+    law = ElasticPlastic(E, NU, YIELD, 1e9)
+    yields, elastic = tip(law), tip(StVenantKirchhoff(E, NU))
+    assert "given up" not in yields.message
+    assert np.all(yields.field("plastic_strain", np.array([[0.0, 0.5], [0.004, 0.0]])) == 0.0)
+    assert_allclose(yields.displacement("right"), elastic.displacement("right"), rtol=1e-8)
+
+
 @pytest.mark.parametrize("element", EVEN[1:], ids=name)
 def test_springback_and_residual_stress(element):
     """Bent to 3 k_y, the end is let go: elastic in all points, from M(k) to zero."""

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.band import add_multiple, clear
-from ..core import I1, I2, cached_property, primitive, source
+from ..core import I1, I2, Array, cached_property, primitive, source
 from .beam import Beam
 from .kernels.elements import Elements
-from .kernels.kernel import Past, elements_of, remembering
+from .kernels.kernel import ElementsWithHistory, Past, elements_of, remembering
 from .kernels.tables import CABLE, LINEAR, StrainTables, repeated, scaled, together
 from .kernels.runs import (run_accept, run_eigen_force, run_eigen_tangent, run_force,
                            run_linearised, run_put, run_tangent, run_unsymmetric)
@@ -36,6 +36,11 @@ class Body:
     def after(self, past: Past) -> "Body":
         """A copy whose elements have views of a history."""
         return Body(self.packs, self.table, elements=remembering(self.elements, past))
+
+    def elastic_from(self, u: Array) -> "Body":
+        """A copy whose laws with a history are elastic from their stress at u (N,)."""
+        return Body(self.packs, self.table, elements=[
+            e.elastic_from(u) if isinstance(e, ElementsWithHistory) else e for e in self.elements])
 
 
 class FlatBody(NamedTuple):

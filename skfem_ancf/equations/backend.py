@@ -11,7 +11,7 @@ from threading import RLock
 from typing import Any, NamedTuple
 
 from ..beam.kernels.tables import CUSTOM, HISTORY
-from ..core import announced_bar, cached_property, code_cache, deferred, raise_kept
+from ..core import Array, announced_bar, cached_property, code_cache, deferred, raise_kept
 from ..core.switch import compiled_off, compiled_setting
 from .tables import Tables
 
@@ -88,6 +88,10 @@ class Backend:
             return None if base is None else base.after(base.tables.after(self.tables.system))
         tables = self.tables.linearised
         return None if tables is None else self.with_tables(tables)
+
+    def elastic_from(self, u: Array) -> Backend:
+        """The backend for :meth:`Tables.elastic_from`."""
+        return self.with_tables(self.tables.elastic_from(u))
 
     def with_tables(self, tables: Tables) -> Backend:
         """A copy for other tables."""

@@ -48,7 +48,7 @@ def correction_size(e, R, du, phi, dm):
 
 @source
 def force_size(e, force, load, u):
-    """Size of an equilibrium u (N,): that of the larger of its forces (N,), displaced by u."""
+    """Size of an equilibrium, or of its change: that of the larger force (N,), displaced by u."""
     return np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
 
 

@@ -153,6 +153,10 @@ class Tables:
         body = Body([linearised(t) for t in body.packs], body.table)
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
 
+    def elastic_from(self, u: Array) -> "Tables":
+        """Tables whose laws with a history are elastic from their stress at u (N,)."""
+        return self.with_equations(self.plain._replace(body=self.plain.body.elastic_from(u)))
+
     def copied(self, n: int) -> "Tables":
         """Tables for n displacements at once."""
         return self.with_equations(self.plain._replace(

@@ -284,7 +284,7 @@ class Tracer:
         u, m, load = start.u, start.multipliers, start.load
         _, stresses = system.assemble(u, load)
         du, dm, dl = first
-        step, work, before, rules, none = np.zeros(system.N), np.inf, 0.0, self.rules, np.zeros(0)
+        step, work, before, rules = np.zeros(system.N), np.inf, 0.0, self.rules
         for k in range(1, rules.iterations + 1):
             independent = system.linearised_stress(u, stresses, du)
             u, m, load, step = u + du, m + dm, load + dl, step + du
@@ -296,8 +296,9 @@ class Tracer:
             residual, phi = load * external - force, system.constraints.constraint(u, load)
             if system.constraints.joints:
                 residual = residual - m @ system.constraints.full_jacobian(u, load)
+            pull = dl * external
             reference = max(force_size(e, force, load * external, u),
-                            correction_size(e, dl * external, step, none, none))
+                            force_size(e, pull, pull, step))
             contraction = work / before if 0.0 < work < before else 1.0
             if is_small(work, contraction, rules.tol, reference, rules.noise) and self._balanced(
                     residual, phi, force, load * external):
@@ -316,8 +317,9 @@ class Tracer:
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise LoadStepFailed("the iteration leaves the path")
             before = work if k > 1 else 0.0
+            pull = dl * external  # the load is an unknown too
             work = np.hypot(correction_size(e, residual * e.free, du, phi, dm),
-                            correction_size(e, dl * external, du, none, none))  # of the load
+                            force_size(e, pull, pull, du))
         raise LoadStepFailed(f"no convergence in {rules.iterations} iterations")
 
 

@@ -146,23 +146,28 @@ class Increment:
                              f"{AUGMENTED} corrections of the pressure")
 
     def from_start(self, options: Options) -> Equilibrium:
-        """Iterate from the last equilibrium; if that fails, from the equilibrium of the linearised
-        law. A correction that turns a beam far strains it temporarily, possibly beyond the range of
-        a nonlinear law. The equilibrium of Hooke's law is close to the final one."""
-        backend = None if self.start.diverging else self.system.backend.linearised
+        """Iterate from the last equilibrium; if that fails, from the equilibrium of Hooke's law,
+        which is close to the final one. A correction that turns a beam far strains it temporarily,
+        possibly beyond the range of a nonlinear law. Of laws with a history it is far beyond yield:
+        there Hooke's law comes first, except in the increments of a run, which are small."""
+        system, start, failure = self.system, self.start, None
+        remembers = system.histories.of_beams.history.size > 0
+        backend = None if start.diverging or (remembers and system.clock is not None) else (
+            system.backend.elastic_from(start.u) if remembers else system.backend.linearised)
         if backend is None:
             return self.iterate(options=options)
-        try:
-            return self.iterate(options=options, by_third=True)
-        except LoadStepFailed as failed:
-            failure = failed
+        if not remembers:
+            try:
+                return self.iterate(options=options, by_third=True)
+            except LoadStepFailed as failed:
+                failure = failed
         try:
             close = self.iterate(options=options._replace(tol=max(options.tol, strategies.CLOSE)),
                                  backend=backend)
             return self.iterate(close, options)
         except LoadStepFailed:
-            self.start.diverging = True
-        if isinstance(failure, Diverging):
+            start.diverging = True
+        if failure is None or isinstance(failure, Diverging):
             return self.iterate(options=options)
         raise failure
 

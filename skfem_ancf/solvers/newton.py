@@ -207,12 +207,13 @@ class Search:
                 system.internal_force(self.route.u, 0.0, 0.0) * system.constraints.mask)))
         if early and self.stable:
             yield "descent", self.descent
-        # the last one may take as many iterations as it needs
-        few = self.stabilised_by_loads or self.stable and not early
+        # the last one may take as many iterations as it needs; what yields may need many steps
+        few = (self.stabilised_by_loads or self.stable and not early) and not (
+            system.histories.of_beams.history.size)
         yield "smaller load steps", partial(self.load_steps, "mixed", few)
         if self.stable and not early:
             yield "descent", self.descent
-            if system.clock is None:  # increments of a run are cut instead
+            if few and system.clock is None:  # increments of a run are cut instead
                 yield "load steps as small as may be", partial(self.load_steps, "mixed")
 
     def _note(self, name, failure=""):
