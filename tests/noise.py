@@ -30,13 +30,12 @@ SEAMS = [
     # entries of bands, and solutions
     ("core.band", "core.loops", "factorize", ["A.flat"], []),
     ("core.band", "core.loops", "solve", [], ["x"]),
-    ("core.band", None, "solve_many", [], ["X"]),
     ("core.band", "core.loops", "solve_dependent", ["S"], ["b"]),
     ("core.band", "core.loops", "factorize_complex", ["A"], []),
-    ("core.band", "core.loops", "solve_complex", [], ["x", "y"]),
+    ("core.band", "core.loops", "solve_columns", [], ["x"]),
 ]
 #: Functions of LAPACK whose matrix, or whose solution, is changed where this module calls them.
-LAPACK = "core.band", ["dpbtrf", "dgbtrf"], ["dpbtrs", "dgbtrs"]
+LAPACK = "core.band", ["dpbtrf", "dgbtrf"], ["dgbtrs"]
 
 ODD, EXPONENT = 0x9E3779B97F4A7C15, 0x7FF
 

@@ -32,11 +32,11 @@ import numpy as np
 from numba import njit
 from skfem_ancf.core import band, jit
 jit.register()
-solve_complex = band.solve_complex
-A = np.repeat([2.0, 0.0, 4.0, 0.0], [1, band.SPARE, 1, 3 * band.SPARE + 2])
-for solve in (solve_complex, njit(lambda A, width, x, y: solve_complex(A, width, x, y))):
+solve_columns = band.solve_columns
+A = np.repeat([2.0, 0.0, 4.0, 0.0], [1, band.SPARE, 1, band.SPARE])
+for solve in (solve_columns, njit(lambda A, ld, width, x: solve_columns(A, ld, width, x))):
     x = np.array([0.625, 3.25])
-    solve(A, 0, x, np.zeros(2))
+    solve(A, 1 + band.SPARE, 0, x)
     print(*map(repr, map(float, x)))
 """
 

@@ -352,7 +352,8 @@ def _cholesky(A):
     ab = as_lapack(A)
     c, info = lapack.dpbtrf(ab, lower=1)
     if info == 0:
-        ab[0], ab[1:] = c[0] ** 2, c[1:] / c[0]
+        np.divide(c.T, c[0, :, None], out=ab.T)
+        ab[0] = c[0] ** 2
     return info == 0
 
 
@@ -446,37 +447,26 @@ def solve_many(A, X):
         for x in X:
             coupling(A, x)
         return
-    ab = as_lapack(A)
     if A.top > 0:
-        X[:] = lapack.dgbtrs(ab, A.width, A.width, X.T, A.pivots)[0].T
+        X[:] = lapack.dgbtrs(as_lapack(A), A.width, A.width, X.T, A.pivots)[0].T
         return
-    y = lapack.dtbtrs(ab, X.T, uplo="L", diag="U")[0] / ab[0][:, None]
-    X[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].T
+    for x in X:
+        solve_columns(A.flat, A.ld, A.width, x)
 
 
 @primitive("skfem_ancf.core.loops")
-def factorize_complex(A, width):
-    """L D L^T of a complex symmetric band in place; False if it fails."""
-    # A has real parts, then imaginary parts, each as in a symmetric :class:`Band` of half bandwidth
-    # ``width``.
-    both = _complex(A).reshape(-1, width + 1 + SPARE)
-    if not _eliminate(both[:, :width + 1], 0.0):
-        return False
-    A[:A.size // 2], A[A.size // 2:] = both.real.ravel(), both.imag.ravel()
-    return True
+def solve_columns(A, ld, width, x):
+    """Solve in place with L D L^T factors A of a symmetric band, real or complex; x is (n,)."""
+    ab = A.reshape(-1, ld).T  # whole columns, of which BLAS needs no copy
+    tbsv = blas.ztbsv if np.iscomplexobj(A) else blas.dtbsv
+    y = tbsv(width, ab, x, lower=1, diag=1) / ab[0]
+    x[:] = tbsv(width, ab, y, lower=1, trans=1, diag=1)
 
 
 @primitive("skfem_ancf.core.loops")
-def solve_complex(A, width, x, y):
-    """Solve in place with the factors of :func:`factorize_complex`; x + i y is (n,)."""
-    ab = _complex(A).reshape(x.size, -1)[:, :width + 1].T
-    z = lapack.ztbtrs(ab, x + 1j * y, uplo="L", diag="U")[0].ravel() / ab[0]
-    z = lapack.ztbtrs(ab, z, uplo="L", trans="T", diag="U")[0].ravel()
-    x[:], y[:] = z.real, z.imag
-
-
-def _complex(A):
-    return A[:A.size // 2] + 1j * A[A.size // 2:]
+def factorize_complex(A, ld, width):
+    """L D L^T of a complex symmetric band, stored as a real one, in place; False if it fails."""
+    return _eliminate(A.reshape(-1, ld)[:, :width + 1], 0.0)
 
 
 @source
@@ -521,13 +511,13 @@ def add_scaled(A, factor, U):
                 later[j, top - k] = rows[j, k] + factor * later[j, top - k]
 
 
-@source
+@apart("band", Band, I1)
 def fix(A, fixed):
     """Set rows and columns of these numbers to those of the identity."""
     fix_stored(A.flat, A.ld, A.width, A.top, fixed)
 
 
-@apart("band", F1, int, int, int, I1)
+@source
 def fix_stored(flat, ld, width, top, fixed):
     """:func:`fix` for stored entries."""
     n, step = flat.size // ld, max(1, ld - 1)

@@ -4,7 +4,7 @@ of its name that :func:`skfem_ancf.core.source.primitive` marks."""
 import numpy as np
 
 from .callbacks import ask, solved
-from .band import LOST, REPEATED, SPARE, Band, coupling
+from .band import LOST, REPEATED, Band, coupling
 from .source import F1, apart, source
 
 indices = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}
@@ -171,6 +171,10 @@ def exchange(A):
 
 @apart("band", F1, int, int, F1)
 def solve_lower(A, ld, width, x):
+    solve_columns(A, ld, width, x)
+
+
+def solve_columns(A, ld, width, x):
     n = x.size
     last = n - n % 4
     for j in range(0, last, 4):
@@ -227,60 +231,23 @@ def solve_exchanged(A, x):
             x[b + i] -= flat[at + i] * xj
 
 
-def factorize_complex(A, width):
-    ld, half = width + 1 + SPARE, A.size // 2
-    n = half // ld
+def factorize_complex(A, ld, width):
+    n, both, turned = A.size // ld, A.view(np.float64), np.empty(2 * width + 2)
     for j in range(n):
-        at, m = j * ld, min(width, n - 1 - j)
-        a, b = A[at], A[half + at]
-        size = a * a + b * b
-        if not size > 0.0 or not size < np.inf:
+        at, m = U(j * ld), U(min(width, n - 1 - j))
+        if not 0.0 < abs(A[at]) < np.inf:
             return False
-        a, b = a / size, b / size
-        for k in range(1, m + 1):
-            re, im, p, q = U(at + k), U(half + at + k), U(at + k * ld), U(half + at + k * ld)
-            c, d = A[re] * a + A[im] * b, A[im] * a - A[re] * b
-            for i in range(U(m + 1 - k)):
-                A[p + i] -= c * A[re + i] - d * A[im + i]
-                A[q + i] -= c * A[im + i] + d * A[re + i]
-        re, im = U(at), U(half + at)
-        for k in range(I, U(m + 1)):
-            x, y = A[re + k], A[im + k]
-            A[re + k], A[im + k] = x * a + y * b, y * a - x * b
+        inverse = 1.0 / A[at]
+        for k in range(I, m + I):  # i times the column
+            turned[J * k], turned[J * k + I] = -A[at + k].imag, A[at + k].real
+        for k in range(I, m + I):  # real and imaginary parts in turn, which LLVM vectorises
+            c, b, p, q = A[at + k] * inverse, J * (at + k * U(ld)), J * (at + k), J * k
+            x, y = c.real, c.imag
+            for i in range(J * (m + I - k)):
+                both[b + i] -= x * both[p + i] + y * turned[q + i]
+        for k in range(I, m + I):
+            A[at + k] *= inverse
     return True
-
-
-def solve_complex(A, width, x, y):
-    # two columns at once, as above four
-    n, half = x.size, A.size // 2
-    ld, last = half // n, n - n % 2
-    for j in range(0, last, 2):
-        p, q, m, t = U(j * ld), U(half + j * ld), min(width, n - 2 - j), U(j + 2)
-        r, s, a, b = p + U(ld), q + U(ld), x[j], y[j]
-        c, d = x[j + 1] - A[p + I] * a + A[q + I] * b, y[j + 1] - A[p + I] * b - A[q + I] * a
-        x[j + 1], y[j + 1] = c, d
-        p, q, r, s = p + J, q + J, r + I, s + I
-        for k in range(U(m)):
-            e, f, g, h = A[p + k], A[q + k], A[r + k], A[s + k]
-            x[t + k] -= e * a - f * b + g * c - h * d
-            y[t + k] -= e * b + f * a + g * d + h * c
-    for j in range(n):
-        a, b, c, d = A[j * ld], A[half + j * ld], x[j], y[j]
-        size = a * a + b * b
-        x[j], y[j] = (c * a + d * b) / size, (d * a - c * b) / size
-    for j in range(last - 2, -1, -2):
-        p, q, m, t = U(j * ld), U(half + j * ld), min(width, n - 2 - j), U(j + 2)
-        r, s, a, b, c, d = p + U(ld), q + U(ld), x[j], y[j], x[j + 1], y[j + 1]
-        e, f, g, h = p + J, q + J, r + I, s + I
-        for k in range(U(m)):
-            u, v = x[t + k], y[t + k]
-            a -= A[e + k] * u - A[f + k] * v
-            b -= A[e + k] * v + A[f + k] * u
-            c -= A[g + k] * u - A[h + k] * v
-            d -= A[g + k] * v + A[h + k] * u
-        a -= A[p + I] * c - A[q + I] * d
-        b -= A[p + I] * d + A[q + I] * c
-        x[j], y[j], x[j + 1], y[j + 1] = a, b, c, d
 
 
 def solve_dependent(S, b):

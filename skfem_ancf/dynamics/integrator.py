@@ -515,7 +515,7 @@ class StageIntegrator(Integrator):
             np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
             *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)),
             np.zeros(2 * b), np.zeros((2 * b, 2 * b)), np.zeros((k, 2 * b, 2 * b)),
-            np.zeros((n, N)), np.zeros((k, 2 * N * ld)),
+            np.zeros((n, N)), np.zeros((k, N * ld), complex),
             Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0), np.zeros((b, N)),
             np.zeros((2 * k, b, N)), np.zeros((2, rows, rows)), np.zeros((2, m, N)),
             np.zeros((m, m)), np.zeros(m), D, method])

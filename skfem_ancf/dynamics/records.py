@@ -11,7 +11,7 @@ from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import accept_body, add_viscous_force, body_tangent
 from ..core.band import Band, clear, dot, multiply, solve, solve_dependent, subtract_rows
 from ..core.callbacks import JOINTS, call_custom
-from ..core import F1, F2, F3, I1, MADE, apart, indices, source
+from ..core import C2, F1, F2, F3, I1, MADE, apart, indices, source
 from ..equations.tables import Equations
 
 
@@ -361,7 +361,7 @@ class StageWork(NamedTuple):
     q: F2  # work, (2 b, 2 b)
     Q: F3  # Schur complement of the rows for each eigenvalue, (k, 2 b, 2 b)
     origins: F2  # displacement of the factorised matrix in each row, (n, N)
-    pairs: F2  # factors of complex eigenvalues, real and imaginary parts, (k, 2 N ld)
+    pairs: C2  # factors of complex eigenvalues, (k, N ld)
     real: Band  # factor of the real eigenvalue
     J: F2  # low-rank rows at the origin, joints first, (b, N)
     Y: F3  # their solutions, (2 k, b, N)

@@ -13,8 +13,8 @@ from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, a
                               carry_eigenstrains, constraint, external_force, joint_directions)
 from ..beam.strain_energy import (add_force_of, add_viscous_stress, body_force, body_linearised,
                                   body_mean_stress, body_mixed, body_stress, body_tangent)
-from ..core.band import (SPARE, add_multiple, clear, copy, factorize, factorize_complex,
-                         fix_stored, multiply, solve, solve_complex, solve_dependent, solve_joined)
+from ..core.band import (add_multiple, clear, copy, factorize, factorize_complex, fix, fix_stored,
+                         multiply, solve, solve_columns, solve_dependent, solve_joined)
 from ..core import indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
                                      SINGULAR, correction_size, judged, motion_size,
@@ -62,16 +62,19 @@ def factorize_stages(e, matrices, method, s, w, state, step):
             add_element_damping(e.forces, s.times[at], origin, w.y[1], w.D)
     if w.J.shape[0] > 0:
         _rows(e, matrices, s, w, at)
+    ld, width, shape = w.real.ld, w.real.width, (origin.size, w.real.ld)
     for k in range(method.values.shape[1]):
         a, b = method.values[0, k] / s.h, method.values[1, k] / s.h
         if b != 0.0:
             F = w.pairs[k]
-            half = F.size // 2
-            _combine(e.K, matrices.M, w.D, e.fixed, 1.0, a * a - b * b, a, F[:half])
-            _combine(e.K, matrices.M, w.D, e.fixed, 0.0, 2.0 * a * b, b, F[half:])
-            done = factorize_complex(F, e.K.width)
+            columns = shaped(F, shape)
+            _combine(e.K, matrices.M, w.D, 1.0, a * a - b * b, a, columns.real)
+            _combine(e.K, matrices.M, w.D, 0.0, 2.0 * a * b, b, columns.imag)
+            fix_stored(F, ld, width, 0, e.fixed)
+            done = factorize_complex(F, ld, width)
         else:
-            _combine(e.K, matrices.M, w.D, e.fixed, 1.0, a * a, a, w.real.flat)
+            _combine(e.K, matrices.M, w.D, 1.0, a * a, a, shaped(w.real.flat, shape))
+            fix(w.real, e.fixed)
             done = factorize(w.real)
         if not done:
             return False
@@ -145,10 +148,15 @@ def _stiffen(S, p, z, m, column):
 @source
 def solve_for(w, k, x, y):
     """Solve in place with the factors of eigenvalue k; y is unchanged if that is real."""
-    if w.method.values[1, k] != 0.0:
-        solve_complex(w.pairs[k], w.real.width, x, y)
-    else:
+    if w.method.values[1, k] == 0.0:
         solve(w.real, x)
+        return
+    z = np.empty(x.size, np.complex128)
+    copy(x, z.real)
+    copy(y, z.imag)
+    solve_columns(w.pairs[k], w.real.ld, w.real.width, z)
+    copy(z.real, x)
+    copy(z.imag, y)
 
 
 @source
@@ -182,24 +190,19 @@ def join(method, s, w, k, r, q, x, y):
 
 
 @source
-def _combine(K, M, D, fixed, c, m, d, out):
-    """``c K + m M + d D`` with the supports fixed, the lower half of each column."""
+def _combine(K, M, D, c, m, d, columns):
+    """``c K + m M + d D``, the lower half of each column."""
     # Of an unsymmetric K, its symmetric part; the iteration corrects the rest.
-    ld, top = K.width + 1 + SPARE, K.top
-    n, x, y, z = out.size // ld, K.flat, M.flat, D.flat
-    columns = shaped(out, (n, ld))
-    if top > 0:
-        k, l, r = shaped(x, (n, K.ld)), shaped(y, (n, K.ld)), shaped(z, (n, K.ld))
-        for h in range(min(K.width + 1, n)):
-            for j in indices(n):
-                columns[j, h] = c * k[j, top + h] + m * l[j, top + h] + d * r[j, top + h]
-            later = k[h:]
-            for j in indices(n - h):
-                columns[j, h] += 0.5 * c * (later[j, top - h] - k[j, top + h])
-    else:
-        for i in indices(out.size):
-            out[i] = c * x[i] + m * y[i] + d * z[i]
-    fix_stored(out, ld, K.width, 0, fixed)
+    top, n = K.top, columns.shape[0]
+    whole = shaped(K.flat, (n, K.ld))
+    x, y, z = whole[:, top:], shaped(M.flat, (n, K.ld))[:, top:], shaped(D.flat, (n, K.ld))[:, top:]
+    for j in indices(n):
+        for h in indices(x.shape[1]):
+            columns[j, h] = c * x[j, h] + m * y[j, h] + d * z[j, h]
+    for h in range(min(K.width + 1, n) if top > 0 else 0):
+        later = whole[h:]
+        for j in indices(n - h):
+            columns[j, h] += 0.5 * c * (later[j, top - h] - x[j, h])
 
 
 # steps
