@@ -4,8 +4,7 @@ import os
 import sys
 from collections.abc import Callable
 
-from .core.code_cache import folder, nothing_collected, on_disk
-from .core.switch import VARIABLE, compiled_off
+from .core.code_cache import VARIABLE, compiled_off, folder, nothing_collected, on_disk
 
 
 def compile_all() -> None:

@@ -15,7 +15,7 @@ import noise
 
 from skfem_ancf import MeshBeam
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.core.switch import compiled_off
+from skfem_ancf.core.code_cache import compiled_off
 
 
 def pytest_addoption(parser):

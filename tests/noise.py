@@ -53,7 +53,7 @@ def install(seed):
     scipy.sparse.linalg.splu = wraps(splu)(lambda *args, **options: _Factors(
         splu(*args, **options), shake))
     _everywhere(splu, scipy.sparse.linalg.splu)
-    from skfem_ancf.core.switch import compiled_off
+    from skfem_ancf.core.code_cache import compiled_off
 
     if compiled_off() is None:
         _install_loops(seed)

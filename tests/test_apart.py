@@ -10,7 +10,7 @@ import pytest
 
 from skfem_ancf.core import callbacks
 from skfem_ancf.core.source import APART, F1, PYTHON, apart, indices, source
-from skfem_ancf.core.switch import compiled_off
+from skfem_ancf.core.code_cache import compiled_off
 
 needs_numba = pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
 

@@ -61,7 +61,7 @@ def test_a_first_solution_imports_no_compiler(tmp_path):
 def auto(needs_compiled, monkeypatch):
     """The default rules, nothing loaded, nothing on disk; what is compiled is plain Python."""
     from skfem_ancf.core import jit
-    from skfem_ancf.core.switch import VARIABLE
+    from skfem_ancf.core.code_cache import VARIABLE
 
     monkeypatch.delenv(VARIABLE, raising=False)
     compiled, s = [], scene()
@@ -158,7 +158,7 @@ def test_all_that_is_compiled_marks_the_cache():
     files = {path.relative_to(PACKAGE).with_suffix("").as_posix() for path in
              code_cache.compiled_files()}
     assert {"equations/evaluation", "core/loops", "core/jit", "beam/kernels/tables"} <= files
-    assert not files & {"core/switch", "core/code_cache", "equations/backend", "scene/scene"}
+    assert not files & {"core/code_cache", "equations/backend", "scene/scene"}
     for function, module in MARKED.items():
         if module is not None or not function.__module__.startswith("skfem_ancf"):
             continue
@@ -208,7 +208,7 @@ def test_the_command_says_how_it_is_used():
 
 
 def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
-    from skfem_ancf.core.switch import VARIABLE
+    from skfem_ancf.core.code_cache import VARIABLE
     from skfem_ancf.__main__ import compile_all
 
     monkeypatch.setenv(VARIABLE, "1")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skfem_ancf.core import band
-from skfem_ancf.core.switch import compiled_off
+from skfem_ancf.core.code_cache import compiled_off
 
 SIZES = [(1, 0), (2, 1), (3, 2), (4, 1), (5, 3), (7, 6), (9, 8), (30, 2), (31, 5), (102, 11)]
 

@@ -9,7 +9,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.actions.joints import JOINTS
-from skfem_ancf.core.switch import compiled_off
+from skfem_ancf.core.code_cache import compiled_off
 
 if compiled_off() is not None:
     pytest.skip(compiled_off(), allow_module_level=True)

@@ -10,7 +10,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 from skfem_ancf.beam.kernels import CableKernel, SectionKernel, loops, runs, tables
 from skfem_ancf.beam.kernels.compiled import compiled_tables
 from skfem_ancf.beam.kernels.elements import Elements
-from skfem_ancf.core.switch import compiled_off
+from skfem_ancf.core.code_cache import compiled_off
 from skfem_ancf.equations import evaluation
 from skfem_ancf.formulations import get_formulation
 from skfem_ancf.materials import Material

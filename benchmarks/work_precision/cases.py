@@ -2,7 +2,7 @@
 
 import os
 
-from skfem_ancf.core.switch import VARIABLE
+from skfem_ancf.core.code_cache import VARIABLE
 
 from . import exudyn_beams, ours, stock
 from .problems import PROBLEMS

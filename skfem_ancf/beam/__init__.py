@@ -11,6 +11,6 @@ from .distribution import (AXIS, BODY, LEFT, RIGHT, SNAP, UPPER, Distribution, F
                            station_of_node, stations_of_vector, surfaces_of)
 from .layout import (BeamPoints, Layout, Located, PointLocator, WhichBeam, WhichMember,
                      require_body, select_beam, select_member)
-from .remembered import by_history, cable_forces, has_history, remembers, with_history
+from .strains import by_history, cable_forces, has_history, remembers, with_history
 
 __all__ = ["Beam", "RigidBody", "reference_coordinates"]

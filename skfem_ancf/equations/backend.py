@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from ..beam.kernels.tables import CUSTOM, HISTORY
 from ..core import Array, announced_bar, cached_property, code_cache, deferred, raise_kept
-from ..core.switch import compiled_off, compiled_setting
+from ..core.code_cache import compiled_off, compiled_setting
 from .tables import Tables
 
 logger = logging.getLogger(__name__)

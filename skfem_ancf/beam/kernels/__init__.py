@@ -5,7 +5,6 @@ functions, which :mod:`.section` and :mod:`.cable` make. :mod:`.elements` has th
 functions of the displacement ``u = q - q0``: with ``r_X = e_1 + G u``, the strain ``eps_xx = (e_1 +
 G u / 2) . G u`` has no cancellation at small displacements or far from the origin."""
 
-from .cable import CableKernel
-from .section import SectionKernel
+from .section import CableKernel, SectionKernel
 
 __all__ = ["CableKernel", "SectionKernel"]

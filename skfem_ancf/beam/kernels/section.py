@@ -1,5 +1,12 @@
 """Tables of beams with sections: Green-Lagrange strains, sampled as the formulation says. Rows are
-d/dX, then d/dY, at the points of the samples."""
+d/dX, then d/dY, at the points of the samples.
+
+Tables of the shear-rigid cable. ``U = 1/2 int E A eps^2 - 2 E S eps k + E I k^2 ds`` with ``eps
+= |r'| - 1``, the change ``k`` of the material curvature ``kappa = r' x r'' / |r'|^2`` (rotation of
+the tangent per reference length), and the first moment S of the section about the axis. Both are
+sampled at 2 m - 2 Gauss points for an axis of degree 2 m - 1. Those of the cubic axis miss a mode
+(equal axial slopes at both nodes), which gets a third point in the middle with a weight that
+decreases with the slenderness. Rows are d/dX and d^2/dX^2 at each point."""
 
 from __future__ import annotations
 
@@ -9,13 +16,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, lagrange, product_rule
+from ...core import Array, first_order, gauss, lagrange, product_rule, refuse
 from ...elements.base import ElementBeam
 from ...formulations import Formulation, Term
+from ...materials.history import HistoryMaterial
 from ...mesh.mesh_beam import MeshBeam
 from ...sections import Across, Layer
-from .kernel import ElementKernel
-from .tables import LINEAR, SECTION, StrainTables, law_tables, pattern_of
+from .kernel import ElementKernel, fibres, strains
+from .tables import CABLE, LINEAR, NO_LAW, OF_WEIGHTS, SECTION, StrainTables, law_tables, pattern_of
 
 #: Relative size of a modulus between samples that is round-off.
 ORTHOGONAL = 1e-14
@@ -197,3 +205,181 @@ def _mixing(samples, nodes, axis, means, coupled):
     pairs = np.array((both & (row[:, None] < row) | (row[:, None] == row)).nonzero())
     products = A[:, pairs[0]] * A[:, pairs[1]]
     return A, pairs, products, np.abs(products)
+
+
+#: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
+#: beam; the third point has a quarter of it.
+MIDDLE = 1200.0
+
+
+def softened(weight: float) -> tuple[Array, Array]:
+    """Three points on [0, 1], exact for cubics: two Gauss points and a weighted middle one."""
+    # A weight of 4/9 gives the three-point Gauss rule, which is the maximum.
+    weight = min(weight, 4.0 / 9.0)
+    x = 0.5 / np.sqrt(3.0 * (1.0 - weight))
+    outer = 0.5 * (1.0 - weight)
+    return np.array([0.5 - x, 0.5, 0.5 + x]), np.array([outer, weight, outer])
+
+
+def _square(across):
+    """The largest E I about the centroid over E A."""
+    if across.simple:
+        return across.mesh.height**2 / 12.0
+    EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
+    return float(np.max((EI - ES**2 / EA) / EA))
+
+
+def _unit(element, points):
+    """Derivatives of the axis by xi at each point, the first and the second, (rows, nb), and the
+    powers of the length with which they are those by X, (rows,)."""
+    slopes = np.stack([element.axis(points, d).T for d in (1, 2)], axis=1)
+    return slopes.reshape(2 * len(points), -1), np.tile([-1.0, -2.0], len(points))
+
+
+@lru_cache(64)
+def _unit_at_gauss(element, n):
+    return _unit(element, gauss(n)[0])
+
+
+@lru_cache(64)
+def _samples(n, moduli):
+    """The Pattern of n points with the moduli EA, EI, and -ES if three, and the order of these."""
+    s = np.arange(n)
+    rows = 2 * np.array([[*s, *s], [*s, *s]])
+    rows[1, n:] += 1
+    pairs = np.concatenate([[c * n + s, d * n + s] for c, d in (
+        (0, 0), (1, 1), (0, 1))[:moduli]], axis=1)
+    order = np.lexsort(pairs[::-1])
+    return pattern_of(CABLE, rows, pairs[:, order]), order
+
+
+def _has_alone(mesh):
+    """True if an element has no neighbour."""
+    t = mesh.t
+    if mesh.is_chain:
+        return t.shape[1] == 1
+    joined = t[0, 1:] == t[1, :-1]
+    return not np.all(np.append(False, joined) | np.append(joined, False))
+
+
+class CableKernel(ElementKernel):
+    """The kernel of a cable; ``points`` (points,) are its Gauss points on [0, 1]."""
+
+    def __init__(self, across: Across, formulation: Formulation) -> None:
+        mesh, element = across.mesh, across.element
+        super().__init__(mesh, element)
+        self.constant = across.stabilisation(formulation)
+        n = formulation.points_along(element, across.layers[0].material)
+        if n == 2:
+            alpha, length = getattr(formulation, "alpha", 1.0), float(mesh.chain_lengths.min())
+            self._rule = softened(alpha * MIDDLE * _square(across) / length**2)
+        else:
+            if self.constant is None and _has_alone(mesh):
+                n = max(n, element.axis_degree)  # no neighbour stabilises modes of fewer points
+            self._rule = gauss(n)
+        self.points, self._across = self._rule[0], across
+        self.points_number = len(self.points)
+        same = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * mesh.lengths.max()
+        history = any(isinstance(layer.material, HistoryMaterial) for layer in across.layers)
+        self.tables = (self._with_fibres(mesh, element, same) if history else
+                       [self._table(mesh, element, same)])
+
+    def _table(self, mesh, element, same):
+        """Tables of the reference element scaled by the lengths, for one or all elements."""
+        ne, nb, n, w = mesh.nelements, self.nd, self.points_number, self._rule[1]
+        L = (mesh.lengths[:1] if same else mesh.lengths)[:, None]
+        unit, orders = (_unit_at_gauss(element, n) if self._rule is gauss(n) else
+                        _unit(element, self.points))
+        G = unit * (L**orders)[:, :, None] * element.powers(1.0, L)[:, None]
+        EA, ES, EI = self._across.moments(
+            self.points, np.zeros(1, int) if same and self._across.constant else None) * (w * L)
+        moduli = [EA, EI, -ES] if ES.any() else [EA, EI]
+        pattern, order = _samples(n, len(moduli))
+        #: Modulus times volume.
+        self.scale = float(EA.sum()) * (ne // len(EA))
+        H = np.concatenate(moduli, axis=1).take(order, 1)
+        frame = self._frame(mesh, element, n, G)
+        C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
+             self.constant[:, 2:, 2:])
+        each = [len(x) > 1 for x in (G, frame, H, C)] + [False]
+        return StrainTables(
+            pattern, nb * mesh.t[0].astype(np.int64), np.arange(ne)[:, None] * each,
+            *map(np.ascontiguousarray, (G[:, :, 1:], frame, H, C)),
+            NO_LAW, np.zeros((0, 2 * n)), np.zeros((1, 0)))
+
+    def _with_fibres(self, mesh, element, same):
+        """A table of fibres for each layer."""
+        across = self._across
+        refuse(any(callable(layer.grade) for layer in across.layers), "a cable with a law that has "
+               "a history needs a constant E in its other layers: give more layers in place of "
+               "E(x, y), or use an element with sections")
+        same = same and across.constant
+        whole, n = self._table(mesh, element, same), self.points_number
+        L, tind = mesh.lengths[:, None], None
+        if same:
+            L, tind = L[:1], np.zeros(1, int)
+        (pattern, order), out = _samples(n, 3), []
+        for layer in across.layers:
+            Y, A = fibres(across, layer, self.points, tind)
+            every = np.repeat(np.eye(n), Y.shape[2], 0)
+            along = np.concatenate([np.broadcast_to(every, (len(Y), *every.shape)),
+                                    -Y.reshape(len(Y), -1, 1) * every], axis=2)
+            along = along[0] if len(along) == 1 else along
+            weights = L * (self._rule[1][:, None] * A).reshape(len(A), -1)
+            E = layer.material.axial_modulus
+            H = np.concatenate([E * np.sum(A * Y**k, axis=-1) * (-1.0) ** k * L * self._rule[1]
+                                for k in (0, 2, 1)], axis=1)
+            law = law_tables(layer.material.law(), self)
+            if law.kind == LINEAR:
+                along, weights = np.zeros((0, 2 * n)), np.zeros((1, 0))
+            at = whole.at.copy()
+            at[:, OF_WEIGHTS] = np.arange(len(at)) if len(weights) > 1 else 0
+            out.append(whole._replace(
+                at=at, pattern=pattern, H=np.ascontiguousarray(H[:, order]),
+                C=whole.C[:0] if out else whole.C, law=law, along=along, weights=weights))
+        return out
+
+    def _frame(self, mesh, element, n, G):
+        """r_X and r_XX in the reference configuration, (1 or ne, rows, 2)."""
+        if mesh.is_straight:
+            left = mesh.t[0, :1] if mesh.is_uniform else mesh.t[0]
+            frame = np.zeros((len(left), 2 * n, 2))
+            frame[:, ::2] = mesh.p_X[:, left].T[:, None]
+            return frame
+        q0 = element.rigid(mesh)
+        q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
+        return G @ self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
+
+    @property
+    def weights(self) -> Array:
+        """Weights of the points of each element, (ne, points)."""
+        return np.outer(self._across.mesh.lengths, self._rule[1])
+
+    @property
+    def volume(self) -> float:
+        w, area = self._rule[1], self._across.moments(self.points, what="area")[0]
+        return float(area @ w @ self._across.mesh.lengths)
+
+    def strain(self, u: Array) -> Array:
+        """Extension and change of curvature at the points, (2, points, ne)."""
+        return strains(self.elements[0], self._checked(u)).reshape(2, self.points_number, -1)
+
+    def outer_stretches(self, u: Array) -> Array:
+        """Stretch of the bottom and top fibres, (2, points, ne)."""
+        def measured(z):
+            return np.abs(z[:, ::2]), (z[:, 1::2] / z[:, ::2]).imag
+
+        t, h = self.tables[0], self._across.mesh.mapping().height(self.points)[0]
+        z = t.frame.view(complex)[..., 0]
+        start, bent = measured(z)
+        y = np.array([-0.5, 0.5])[:, None, None] * h
+        if u.dtype.kind == "c":
+            eps, kappa = (x.T for x in first_order(self.strain(u)))
+        else:
+            U = self.gather(self._checked(u)).view(complex)[..., 0]
+            U[:, self.nd // 2] -= U[:, 0]
+            U = U[:, 1:]
+            length, curvature = measured(z + (
+                U @ t.G[0].T if len(t.G) == 1 else (t.G @ U[..., None])[..., 0]))
+            eps, kappa = length - start, curvature - bent
+        return (1.0 + (eps - y * kappa) / (1.0 - y * bent)).swapaxes(1, 2)
