@@ -593,7 +593,7 @@ def _pairs(where, force):
     return np.asarray(force)[dofs].reshape(-1, 2)
 
 
-def _between_pairs(where, derivative):
+def _matrix_on_pairs(where, derivative):
     _, _, dofs = where
     matrix, n = sparse.csr_array(derivative)[dofs][:, dofs], len(dofs) // 2
     return matrix if sparse.issparse(derivative) else matrix.toarray().reshape(n, 2, n, 2)
@@ -612,8 +612,9 @@ def _number(where, energy):
 #: a result on all degrees of freedom one on pairs of those of the item.
 OF_ITEMS: dict[str, tuple[str, Any]] = {
     **{name: (name, _pairs) for name in ("force", "mean_force", "mean")},
-    "evaluate": ("evaluate", _pairs_and_history), "stiffness": ("stiffness", _between_pairs),
-    "resistance": ("damping", _between_pairs), "mean_stiffness": ("mean_stiffness", _between_pairs),
+    "evaluate": ("evaluate", _pairs_and_history), "stiffness": ("stiffness", _matrix_on_pairs),
+    "resistance": ("damping", _matrix_on_pairs),
+    "mean_stiffness": ("mean_stiffness", _matrix_on_pairs),
     **{name: (name, lambda where, found: found) for name in (
         "start", "corrected", "relaxed", "passed", "search_intervals", "sample")}}
 

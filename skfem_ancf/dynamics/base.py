@@ -180,7 +180,7 @@ class Scheme:
         a finite difference would consist of round-off."""
         return NEAR
 
-    def acting(self, y: Motion) -> list[tuple[float, Motion]]:
+    def force_instants(self, y: Motion) -> list[tuple[float, Motion]]:
         """Instants whose forces act in a step that ends at y, or the means of it, each with its
         time: their sum is the impulse."""
         return [(y.before, y)]

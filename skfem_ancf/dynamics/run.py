@@ -387,9 +387,9 @@ class Run:
             before = value(old) if self._value is None else self._value
             self._value = value(new)
             if before != 0.0 and before * self._value <= 0.0:  # the event is within the step
-                root = scipy.optimize.brentq(lambda t: value(self._between(old, new, t)),
+                root = scipy.optimize.brentq(lambda t: value(self._interpolated(old, new, t)),
                                              old.t, new.t, xtol=EXACT * (new.t - old.t))
-                new = self._between(old, new, root)
+                new = self._interpolated(old, new, root)
                 self.event = new.t
         if self.event is None and new.t >= self._end and not self._last:
             new = self._turn(new)
@@ -414,7 +414,7 @@ class Run:
         until = new.t + 1e-14 * max(abs(self.task.t_start), abs(self.task.t_end))
         while self._next < len(wanted) and wanted[self._next] <= until:
             t = float(wanted[self._next])
-            self._append(new if t == new.t else self._between(old, new, t))
+            self._append(new if t == new.t else self._interpolated(old, new, t))
             self._next += 1
         if self.event is not None and (not self._stored or self._stored[-1]["t"][-1] < new.t):
             self._append(new)
@@ -424,7 +424,7 @@ class Run:
         self._stored.append({name: np.array([none if x is None else x]) for name, x in (
             (name, getattr(y, name)) for name in COLUMNS)})
 
-    def _between(self, old, new, t):
+    def _interpolated(self, old, new, t):
         """The motion within a step, by a shorter step from the same start."""
         # Order, conserved quantities and closed joints are thus those of the scheme.
         h, s = new.t - old.t, (t - old.t) / (new.t - old.t)

@@ -127,9 +127,9 @@ class Collocation(Scheme):
         """As in :class:`Scheme`; only prescribed motions have rates by differences."""
         return NEAR if system.constraints.moves or system.backend.tables.motion_varies else 0.0
 
-    def acting(self, y: Motion) -> list[tuple[float, Motion]]:
+    def force_instants(self, y: Motion) -> list[tuple[float, Motion]]:
         if y.memory is None:
-            return super().acting(y)
+            return super().force_instants(y)
         h, (c, b, inverse, *_), (u, v) = y.before, self.table.method, y.memory["start"]
         U = y.memory["points"][:, :len(u)]
         V = v + inverse @ (U - u - h * c[:, None] * v) / h

@@ -192,7 +192,7 @@ class Recorder:
 
     def _read_step(self, sensor, at, y, state):
         """The value of a sensor at the end of a step, of contact the mean over the step."""
-        instants = [one for part in y.parts or [y] for one in self._scheme.acting(part)
+        instants = [one for part in y.parts or [y] for one in self._scheme.force_instants(part)
                     ] if sensor.what in CONTACT else ()
         if len(instants) < 2:
             return read(sensor, at, state)

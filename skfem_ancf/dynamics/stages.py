@@ -7,7 +7,7 @@ step."""
 import numpy as np
 
 from ..actions.forces.kernels import (add_elastic_force, add_element_damping, add_element_tangent,
-                                      element_damping, element_stiffness, put_between,
+                                      element_damping, element_stiffness, put_far_stiffness,
                                       set_contact_rate)
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, add_load_stiffness,
                               carry_eigenstrains, constraint, external_force, joint_directions)
@@ -84,12 +84,12 @@ def factorize_stages(e, matrices, method, s, w, state, step):
             for i in indices(y.size):
                 y[i] = 0.0
             solve_for(w, k, x, y)
-        _between(w, s.h, k)
+        _form_schur_complement(w, s.h, k)
     return True
 
 
 @source
-def _between(w, h, k):
+def _form_schur_complement(w, h, k):
     """Schur complement of the low-rank rows for the eigenvalue k."""
     q, Q, b, m, values = w.q, w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
     for a in range(b):
@@ -122,9 +122,9 @@ def _rows(e, matrices, s, w, at):
     modes, D = matrices.dampers.modes.shape[0], np.empty(forces.size)
     if w.S.shape[1] > modes:
         element_stiffness(forces, t, w.origins[0], w.y[1], 0.0, D)
-        put_between(forces, D, 1.0, modes, w.S[0])
+        put_far_stiffness(forces, D, 1.0, modes, w.S[0])
         element_damping(forces, t, w.origins[0], w.y[1], D)
-        put_between(forces, D, 1.0, modes, w.S[1])
+        put_far_stiffness(forces, D, 1.0, modes, w.S[1])
     for a in range(modes):
         w.S[1, a, a] = 1.0
 

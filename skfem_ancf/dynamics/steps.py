@@ -17,8 +17,8 @@ import numpy as np
 
 from ..actions.contact.tables import PRESSURES
 from ..actions.forces.kernels import (add_contact_tangent, add_elastic_force, add_friction_tangent,
-                                      augment_contact, element_stiffness, keep_entries, put_between,
-                                      set_contact_rate)
+                                      augment_contact, element_stiffness, keep_entries,
+                                      put_far_stiffness, set_contact_rate)
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_curvature_force, add_joint_force,
                               add_load_stiffness, add_products, carry_eigenstrains, constraint,
                               joint_directions, mean_external_force)
@@ -195,7 +195,7 @@ def tangent(e, matrices, rule, s, w, state):
         D = np.empty(forces.size)
         element_stiffness(forces, s.t_force, w.x.middle, w.y[1], rate, D)
         add_products(A, forces.band_at, forces.band_weight, D, forces.band_of)
-        put_between(forces, D, s.stiffness_factor, dampers.modes.shape[0], matrices.rows.S)
+        put_far_stiffness(forces, D, s.stiffness_factor, dampers.modes.shape[0], matrices.rows.S)
     u, u0 = w.x.u, w.y[0] if conserving else w.x.u
     keep_entries(forces, s.t_force, s.stiffness_factor, u0, u)
     if forces.contacts.number > 0:

@@ -373,9 +373,9 @@ class _Part:
             last = D[:, k + 1] - C[:, k] @ X[:, :, nd:]
             to_first = -C[:, k] @ X[:, :, :nd]
         ends = np.empty((len(D), 2, nd, 2, nd))
-        ends[:, 0, :, 0] = _between(left, first, left)
-        ends[:, 1, :, 1] = _between(right, last, right)
-        ends[:, 1, :, 0] = _between(right, to_first, left)
+        ends[:, 0, :, 0] = _projected(left, first, left)
+        ends[:, 1, :, 1] = _projected(right, last, right)
+        ends[:, 1, :, 0] = _projected(right, to_first, left)
         ends[:, 0, :, 1] = ends[:, 1, :, 0].transpose(0, 2, 1)
         for side, basis in enumerate(bases):
             basis.add_curvature(moments, ends[:, side, :, side])
@@ -471,7 +471,7 @@ def _solved(A, inverse, B):
     return X + inverse @ (B - A @ X)
 
 
-def _between(S, A, T):
+def _projected(S, A, T):
     """S^T A T."""
     return S.transpose(0, 2, 1) @ A @ T
 

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_tangent,
+from ..actions.forces.kernels import (NO_SPAN, add_elastic_force, add_element_tangent,
                                       contact_along, contact_work, nothing_touches)
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
@@ -26,7 +26,7 @@ def force(e, u, at, f):
 def mean_force(e, u0, u1, at, f):
     """Set the mean of the internal force, with exact work from u0 to u1."""
     body_mean(e.body, u0, u1, f)
-    add_elastic_force(e.forces, at, AT_ONCE, u0, u1, f)
+    add_elastic_force(e.forces, at, NO_SPAN, u0, u1, f)
 
 
 @source

@@ -18,7 +18,7 @@ ACROSS = 14
 #: left, and that which may be if it does not decrease.
 LATERAL, CLOSE, ROUGH = 50, 1e-13, 1e-8
 #: Step of derivatives, strain and time at which those of a user-defined law are tested.
-TINY, SMALL, SOON = 1e-30, 1e-3, 1.0
+TINY, SMALL, SPAN = 1e-30, 1e-3, 1.0
 
 
 NO_VARIABLES: Mapping[str, int] = {}
@@ -219,13 +219,13 @@ class HistoryMaterial(Material):
         if not hasattr(self, "_consistent"):
             E, d = np.array([[1.3], [-0.7], [0.9]]), np.array([[0.3], [0.7], [-0.6]])
             E, d, zero = SMALL * E, 1e-4 * SMALL * d, np.zeros((self.number, 1))
-            S, after = self.stress(E, zero, SOON)
+            S, after = self.stress(E, zero, SPAN)
             refuse(np.shape(S) != E.shape or np.shape(after) != zero.shape, "stress of {} must "
                    "return the shapes of strain and history, {} and {}, got {} and {}",
                    type(self).__name__, E.shape, zero.shape, np.shape(S), np.shape(after))
-            D = self.moduli(E, zero, SOON)
+            D = self.moduli(E, zero, SPAN)
             require_slope(f"moduli(strain, history, dt) of {type(self).__name__}",
                           "stress(strain, history, dt)",
-                          lambda s: self.stress(E + s * d, zero, SOON)[0],
+                          lambda s: self.stress(E + s * d, zero, SPAN)[0],
                           np.einsum("ij...,j...->i...", D, d))
             self._consistent = True

@@ -159,7 +159,7 @@ class Segment:
         self._geometry(self.e, xi)
         self.R, self.M = self.forces.at(self.e, xi, np.full(len(xi), start))
         if self.forces.viscous is not None:
-            self.Rv, self.Mv = (self._between(x[..., self.elements], np.array([0.5]))
+            self.Rv, self.Mv = (self._at_sections(x[..., self.elements], np.array([0.5]))
                                 for x in self.forces.viscous_middles())
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
         self._solve()
@@ -173,7 +173,7 @@ class Segment:
             setattr(one, name, getattr(self, name)[k])
         return one
 
-    def _between(self, values, xi):
+    def _at_sections(self, values, xi):
         """Spline at the sections through values (..., k) at xi (p,) of the elements, k = n p."""
         e = self.elements
         s = self.recovery.arc.at(np.repeat(e, len(xi)), np.tile(xi, len(e)))
@@ -238,13 +238,13 @@ class Segment:
         return a + t * (d * u + t * (3.0 * (b - a) - d * (2.0 * u + v)
                                      + t * (2.0 * (a - b) + d * (u + v))))
 
-    def across(self, values: Any) -> Array:
+    def over_height(self, values: Any) -> Array:
         """Integral over the height of values (..., n, m)."""
         return (self.span * values) @ self.recovery.intervals.whole
 
     def integral(self, values: Any) -> Array:
         """Integral over the area of values (..., n, m)."""
-        return self.across(self.width * values)
+        return self.over_height(self.width * values)
 
     def from_bottom(self, values: Array) -> Array:
         """Integral from the bottom to each point of values (..., n, m)."""
@@ -327,7 +327,7 @@ class Segment:
     def _turn(self):
         """Set the rate of rotation, and the angles of fibres and frame."""
         intervals, along = self.recovery.intervals, self.g * self.rX[0]
-        total = self.across(self.rY)
+        total = self.over_height(self.rY)
         with_faces = along + self.lean * self.rY[0]
         self.rate = (self.along.d_ds(total[0][..., None])[..., 0]
                      - with_faces @ (intervals.top - intervals.bottom)) / total[1]
@@ -387,7 +387,7 @@ class Segment:
                   + self.width * _turned(self.body, phi))
             bottom, top = [_turned(f[..., None], phi) for f in self.faces]
             dP = dP + self.swell * P  # with the flux through oblique faces
-            left = top + bottom + self.across(dP)[..., None]
+            left = top + bottom + self.over_height(dP)[..., None]
             P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P
             P2 = P2 / (self.g * self.width)
             det = cross(self.rX, self.rY)
@@ -424,7 +424,7 @@ class Segment:
         if weight.any():
             xi, stress = r.samples  # where it is most accurate, (..., ne, p, m)
             values = np.moveaxis(stress[..., self.elements, :, :], -1, -3)
-            values = self._between(values.reshape(*values.shape[:-2], -1), xi)
+            values = self._at_sections(values.reshape(*values.shape[:-2], -1), xi)
             self.S += weight[:, None] * (values.swapaxes(-1, -2) - self.S)
             self.stress_given = True
             self._balance()

@@ -227,7 +227,7 @@ def _recovered(recovery, u, e, xi, after):
         stretch, lam_y = np.sqrt(1.0 + 2.0 * one.strain[:2])
         across = one.angle + np.arccos(np.clip(one.strain[2] / (stretch * lam_y), -1.0, 1.0))
         r_Y = lam_y * np.array([np.cos(across), np.sin(across)])
-        d = one.across(one.from_axis(r_Y) * one.Y)
+        d = one.over_height(one.from_axis(r_Y) * one.Y)
         phi = one.at_axis(one.angle)
         shear = phi + 0.5 * np.pi - unwrapped(angle_of(*d))
         shear = shear - 2.0 * np.pi * np.round(shear.real / (2.0 * np.pi))

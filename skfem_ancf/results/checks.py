@@ -143,7 +143,7 @@ def _yields(state):
     """Findings of ends and stout bodies that press obstacles of default stiffness in too far."""
     system = state._equations
     contacts = system.forces.contacts
-    soft = any(group.firmest > 1.0 for _, group in contacts.groups)
+    soft = any(group.largest_factor > 1.0 for _, group in contacts.groups)
     if not soft or system.constraints.missing_supports:
         return
     t = state._time
@@ -152,11 +152,11 @@ def _yields(state):
     for k, share in enumerate(yields):
         if share > YIELDS:
             which, group = contacts.groups[k]
-            firm = (1.0 + contacts.firmness[k]) * group.law.stiffness
+            stiffness = (1.0 + contacts.stiffening[k]) * group.law.stiffness
             yield (f"{contacts.obstacles[which]!r} of default stiffness yields under the end "
                    f"of a beam or a stout body: some {100.0 * share:.2g} % of its force or of "
                    "the displacement. solve_static and scene.run stiffen it; for motions and "
-                   f"continuation give stiffness={2.0 * firm * share / YIELDS:.2g}, and small "
+                   f"continuation give stiffness={2.0 * stiffness * share / YIELDS:.2g}, and small "
                    "steps where it touches")
 
 

@@ -329,7 +329,7 @@ def _require_same_springs(system, before, u):
         return
     kick = ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, system.N) * system.constraints.mask
     kick *= system.constraints.coordinate_sizes
-    rest, here, up, down = (system.forces.firmnesses(system.backend.tables.plain.forces, x)
+    rest, here, up, down = (system.forces.stiffness_norms(system.backend.tables.plain.forces, x)
                             for x in (before, u, u + kick, u - kick))
     refuse(np.any(np.abs(up - down) > STIFFER * np.maximum(up, down)), "at the buckling load "
            "springs or foundations are stiffer to one side than to the other, such as ropes and "

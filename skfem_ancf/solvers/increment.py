@@ -138,9 +138,9 @@ class Increment:
             if contacts.augment(found.u, self.time) == 0:
                 return found
             if k % SLOW == 0:
-                firmness = np.where(contacts.with_multipliers, STIFFER, 1.0) * (
-                    1.0 + contacts.firmness) - 1.0
-                contacts.set_hardening(np.minimum(firmness, STIFFEST), found.u, self.time)
+                stiffening = np.where(contacts.with_multipliers, STIFFER, 1.0) * (
+                    1.0 + contacts.stiffening) - 1.0
+                contacts.stiffen(np.minimum(stiffening, STIFFEST), found.u, self.time)
             found = self.iterate(found)
         raise LoadStepFailed("the penetration of obstacles is above its tolerance after "
                              f"{AUGMENTED} corrections of the pressure")

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..actions.contact.contacts import FIRMER, YIELDS, Contacts
-from ..actions.contact.tables import ANCHORED, BILATERAL, hardening
+from ..actions.contact.contacts import LARGEST_FACTOR, YIELDS, Contacts
+from ..actions.contact.tables import ANCHORED, BILATERAL, stiffness_factor
 from ..actions.forces.springs import Turns
 from ..core import NO_FACTORS, Array, handle_of
 from ..core.band import fix
@@ -330,41 +330,41 @@ def bound(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
         memory[ANCHORED], memory[BILATERAL] = 0.0, 1.0
         for k, ((_, group), flag) in enumerate(zip(contacts.groups, flags)):
             pair = contacts.tables.pairs[k]
-            far = FAR * group.height * hardening(pair)
+            far = FAR * group.height * stiffness_factor(pair)
             pair.multipliers[:], pair.largest[0] = far * flag, far
         yield
     finally:
         memory[:] = before
 
 
-def releasing_firmness(contacts: Contacts, u: Array, t: float) -> Array:
-    """The firmness with which the mean pressure keeps all points in contact, shape (groups,)."""
-    out = contacts.firmness.copy()
+def releasing_stiffening(contacts: Contacts, u: Array, t: float) -> Array:
+    """The stiffening with which the mean pressure keeps all points in contact, shape (groups,)."""
+    out = contacts.stiffening.copy()
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
         deep = np.maximum(-gap, 0.0)
         if np.any(deep):
             mean = group.areas @ deep / group.areas[deep > 0.0].sum()
-            most = max(1.0, group.firmest / FIRMER)
+            most = max(1.0, group.largest_factor / LARGEST_FACTOR)
             out[k] = min(most, (1.0 + out[k]) * mean / (RELEASED * group.height)) - 1.0
     return out
 
 
-def required_firmness(contacts: Contacts, u: Array, t: float, energy: float,
+def required_stiffening(contacts: Contacts, u: Array, t: float, energy: float,
                       yields: Array) -> Array:
-    """The required firmness, shape (groups,); at least the present one."""
+    """The required stiffening, shape (groups,); at least the present one."""
     # ``energy`` is the strain energy including that of the penetration, ``yields`` the result of
     # :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`.
-    now, stored = contacts.firmness, contacts.potential(u, t)
+    now, stored = contacts.stiffening, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
-        part = (1.0 + now[k]) / (1.0 + out[k])  # penetration at this pressure and the new firmness
+        part = (1.0 + now[k]) / (1.0 + out[k])  # penetration at this pressure, stiffened
         deep, stores = -part * float(gap.min()) / group.height, part * share
         if deep > DEEP or (deep > SEEN and stores > STORED):
             more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
-            most = group.firmest / FIRMER
+            most = group.largest_factor / LARGEST_FACTOR
             out[k] = max(1.0, min(most, (1.0 + out[k]) * more)) - 1.0
         if yields[k] > YIELDS:
-            more = min(group.firmest, (1.0 + now[k]) * yields[k] / (LEFT * YIELDS))
+            more = min(group.largest_factor, (1.0 + now[k]) * yields[k] / (LEFT * YIELDS))
             out[k] = max(out[k], more - 1.0)
     return out
 
@@ -424,7 +424,7 @@ class ContactSearch:
         contacts = self.contacts
         with bound(contacts, flags):
             found = self.solve(None, True)
-        contacts.set_hardening(releasing_firmness(contacts, found.u, self.t), *self.start)
+        contacts.stiffen(releasing_stiffening(contacts, found.u, self.t), *self.start)
         if contacts.anchored:
             with contacts.without_friction():
                 found = self.solve(found, True)
@@ -447,11 +447,11 @@ class ContactSearch:
         system = increment.system
         for _ in range(0 if contacts.untouched(found.u) else TIMES):
             u, yields = found.u, np.zeros(len(contacts.groups))
-            if any(group.firmest > 1.0 for _, group in contacts.groups):
+            if any(group.largest_factor > 1.0 for _, group in contacts.groups):
                 yields = contacts.yielding(u, t, response(system, u, increment.load, t,
                                                           found.multipliers))
-            wanted = required_firmness(contacts, u, t, system.strain_energy(u, t), yields)
-            if np.all(wanted == contacts.firmness):
+            wanted = required_stiffening(contacts, u, t, system.strain_energy(u, t), yields)
+            if np.all(wanted == contacts.stiffening):
                 break
             found, done, rough = self._to(wanted, found, rough)
             if not done:
@@ -459,13 +459,13 @@ class ContactSearch:
         return self.solve(found, False) if rough else found
 
     def _to(self, wanted, found, rough):
-        """The equilibrium at a firmness or the last one before it; if reached; if it is rough."""
+        """The equilibrium at a stiffening or the last one before it; if reached; if it is rough."""
         contacts, step, fails = self.contacts, STEP, 0
         while True:
-            before, now = self._memory.copy(), 1.0 + contacts.firmness
+            before, now = self._memory.copy(), 1.0 + contacts.stiffening
             more = np.clip((1.0 + wanted) / now, 1.0 / step, step)
             last = np.allclose(more * now, 1.0 + wanted, rtol=1e-9)
-            contacts.set_hardening(wanted if last else more * now - 1.0, *self.start)
+            contacts.stiffen(wanted if last else more * now - 1.0, *self.start)
             try:
                 found = self.solve(found, not last)
             except LoadStepFailed:

@@ -21,11 +21,11 @@ from .tables import (ANCHORED, ANCHORS, AUGMENT, BEGIN, CUSTOM, END, FORCE, HEAD
                      weights_of_motion)
 
 
-#: Penetration relative to the height that causes hardening, and the one for which a stiffness is
-#: suggested.
-SUNK, FIRM = 0.5, 0.1
-#: Largest factor of hardening beyond that for deep penetration.
-FIRMER = 1e5
+#: Penetration relative to the height that stiffens an obstacle, and the one for which a stiffness
+#: is suggested.
+SUNK, SUGGESTED = 0.5, 0.1
+#: Largest factor of stiffening beyond that for deep penetration.
+LARGEST_FACTOR = 1e5
 #: Relative error of the answer above which an obstacle is too soft; largest extent of a stout body,
 #: relative to its height.
 YIELDS, STOUT = 0.01, 5.0
@@ -55,8 +55,8 @@ class Group(NamedTuple):
     ``first`` is the first DOF of the element of each point, (n,); ``weights`` and ``slopes`` are
     the weights of pairs of DOFs in its position and in the slope of the axis, (pairs, n), none with
     sections; ``areas`` and ``offsets`` from the axis (n,); ``starts`` reference position and slope,
-    (4, n). Steps may cut the obstacle by ``depth``; ``height`` is that of the beam; ``firmest`` is
-    the largest factor of hardening.
+    (4, n). Steps may cut the obstacle by ``depth``; ``height`` is that of the beam;
+    ``largest_factor`` is that of stiffening.
     """
 
     first: Any
@@ -70,7 +70,7 @@ class Group(NamedTuple):
     depth: float
     height: float
     law: Law
-    firmest: float
+    largest_factor: float
 
 
 class Contacts:
@@ -133,7 +133,7 @@ class Contacts:
             m, own = pair.areas.size, memory[at:at + 4 * pair.areas.size]
             pairs.append(pair._replace(
                 common=memory[:HEAD], largest=memory[HEAD + k:HEAD + k + 1],
-                firmness=memory[HEAD + n + k:HEAD + n + k + 1], multipliers=own[:m],
+                stiffening=memory[HEAD + n + k:HEAD + n + k + 1], multipliers=own[:m],
                 anchors=own[m:3 * m].view(complex), slips=own[3 * m:]))
             at += 4 * m
         return self.tables._replace(memory=memory, pairs=tuple(pairs) or self.tables.pairs)
@@ -218,8 +218,8 @@ class Contacts:
             memory[ANCHORED] = 1.0
 
     @property
-    def firmness(self) -> Array:
-        """Factors of hardening relative to the default stiffness, (groups,), a view; 0 for none."""
+    def stiffening(self) -> Array:
+        """What is added to the default stiffness, relative to it, (groups,), a view; 0 for none."""
         first = HEAD + len(self.groups)
         return self.tables.memory[first:first + len(self.groups)]
 
@@ -228,32 +228,32 @@ class Contacts:
         """Whether a group uses the augmented Lagrangian, (groups,)."""
         return np.array([group.law.tolerance > 0.0 for _, group in self.groups])
 
-    def set_hardening(self, firmness: Array, u: Array, t: float) -> None:
-        """Set factors of hardening; the tractions of sticking points at u do not change."""
+    def stiffen(self, stiffening: Array, u: Array, t: float) -> None:
+        """Set the stiffening; the tractions of sticking points at u do not change."""
         for k, ((which, _), x, _) in enumerate(self.look(u, t)):
-            part, pair = (1.0 + self.firmness[k]) / (1.0 + firmness[k]), self.tables.pairs[k]
+            part, pair = (1.0 + self.stiffening[k]) / (1.0 + stiffening[k]), self.tables.pairs[k]
             points = taken_back(self.pose(which, t, False), x)
             points = points[0] + 1j * points[1]
             pair.anchors[:] = points + part * (pair.anchors - points)
             pair.slips[:] *= part
-        self.firmness[:] = firmness
+        self.stiffening[:] = stiffening
 
     def stiffened(self, k: int, u: Array, t: float) -> tuple[Array, Array, Array]:
         """Derivatives by the logarithm of the stiffness of group k, and forces, of the pressure."""
         # Those of the force on the degrees of freedom (N,); then by point the derivative, and the
         # force, times the penetration, (n,).
         (_, group), _, gap = self.look(u, t)[k]
-        memory, pair, firm = self.tables.memory, self.tables.pairs[k], 1.0 + self.firmness[k]
+        memory, pair, factor = self.tables.memory, self.tables.pairs[k], 1.0 + self.stiffening[k]
         width, a = transition(pair), np.maximum(-gap, 0.0)
-        push = firm * group.law.stiffness * group.areas * a
+        push = factor * group.law.stiffness * group.areas * a
         out, sticks = np.zeros((2, len(u))), memory[ANCHORED]
         try:
             memory[ANCHORED] = 0.0
             for change, force in zip((-CHANGE, CHANGE), out):
-                self.firmness[k] = firm * (1.0 + change) - 1.0
+                self.stiffening[k] = factor * (1.0 + change) - 1.0
                 of_pair(pair, Request(FORCE, t, 0.0, 0.0, 0, 0), u, u, force, np.empty(1))
         finally:
-            memory[ANCHORED], self.firmness[k] = sticks, firm - 1.0
+            memory[ANCHORED], self.stiffening[k] = sticks, factor - 1.0
         return ((out[0] - out[1]) / (2.0 * CHANGE), push * pressure_slope(a, width) * a,
                 push * mean_pressure(a, a, width))
 
@@ -265,7 +265,7 @@ class Contacts:
         # measure of displacements; None without a tangent.
         out = np.zeros(len(self.groups))
         for k, ((_, group), _, gap) in enumerate(self.look(u, t)):
-            if group.firmest <= 1.0 or not np.any(gap < 0.0):
+            if group.largest_factor <= 1.0 or not np.any(gap < 0.0):
                 continue
             force, change, work = self.stiffened(k, u, t)
             slender = np.ptp(group.starts[:2], axis=1).max() > STOUT * group.height
@@ -430,8 +430,8 @@ class Contacts:
                 () if self.untouched(u) else self.look(u, t)):
             if self.obstacles[which].method == "augmented":
                 continue
-            firmness, width = self.firmness[k], transition(self.tables.pairs[k])
-            total += (1.0 + firmness) * group.law.stiffness * float(
+            stiffening, width = self.stiffening[k], transition(self.tables.pairs[k])
+            total += (1.0 + stiffening) * group.law.stiffness * float(
                 group.areas @ potential(-gap, width))
         return total
 
@@ -480,15 +480,16 @@ class Contacts:
         """Text about bodies deep inside obstacles of default stiffness, or ""."""
         out: list[str] = []
         seen = self.look(np.array(u), t) if self.groups and not self.untouched(u) else []
-        for firmness, ((which, group), _, gap) in zip(self.firmness, seen):
+        for stiffening, ((which, group), _, gap) in zip(self.stiffening, seen):
             one, deep, h = self.obstacles[which], -float(gap.min()), group.height
             if one.penalty is None and deep > SUNK * h:
-                k = (1.0 + firmness) * group.law.stiffness
-                firm = k * (deep + max(0.0, deep - h)) / (FIRM * h)  # both faces may be inside
+                k = (1.0 + stiffening) * group.law.stiffness
+                # both faces may be inside
+                enough = k * (deep + max(0.0, deep - h)) / (SUGGESTED * h)
                 out.append(
                     f"a body is {deep:.3g} deep in {one!r}, {deep / h:.2g} times its height: its "
                     f"stiffness, {k:.3g}, is too small for this pressure. Give "
-                    f"stiffness={firm:.2g}, with a penetration of a tenth of the height")
+                    f"stiffness={enough:.2g}, with a penetration of a tenth of the height")
         return out
 
 
@@ -544,7 +545,7 @@ def take_over(contacts: Contacts, earlier: Contacts, u: Array, t: float) -> bool
         new[ANCHORED] = contacts.anchored
     for k, j in found:
         a, b = contacts.tables.pairs[k], earlier.tables.pairs[j]
-        for x, y in zip(a[-5:], b[-5:]):  # largest multiplier, firmness, and those of points
+        for x, y in zip(a[-5:], b[-5:]):  # largest multiplier, stiffening, and those of points
             x[:] = y
         a.anchors[:] += complex(*(earlier.origin - contacts.origin))
     return bool(found)

@@ -116,7 +116,7 @@ class _Path:
         parts = int(np.clip(np.ceil(path[chosen].max() / (2.0 * self._group.depth)), 2, MOST_PARTS))
         for s in np.arange(1, parts) / parts:
             time = t[:1] + s * (t[1] - t[0])
-            x = self._seen(self._vectors(_between(u, v, t, s)[None]), time)[..., at]
+            x = self._seen(self._vectors(_displacement_within(u, v, t, s)[None]), time)[..., at]
             if np.any(-self._gap(x, time) > most):
                 return True
         return False
@@ -165,7 +165,7 @@ class _Path:
         return -out if shape.hollow else out
 
 
-def _between(u, v, t, s):
+def _displacement_within(u, v, t, s):
     """Displacement within a step: cubic, or linear without velocities."""
     change, h = u[1] - u[0], t[1] - t[0]
     straight = u[0] + s * change

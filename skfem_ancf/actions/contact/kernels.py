@@ -23,7 +23,7 @@ from .points import (RESPONSE, TOUCH, Touch, add_bend, add_coupling, add_resista
                      return_mapping, scaled, spread, turned, vector)
 from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, DAMPED_TANGENT, END,
                      FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SETTLE, TINY, ContactTables,
-                     Request, hardening, is_clear, pair_of, set_clear, transition)
+                     Request, stiffness_factor, is_clear, pair_of, set_clear, transition)
 
 #: Largest distance at which anchors follow points in a motion, in radii of an element.
 BEYOND = 4.0
@@ -99,7 +99,7 @@ def of_pair(pair, request, u, v, out, least):
     if what == FORCE:
         least[0] = min(least[0], smallest(b.gap))
     if what < SETTLE:  # those that touch at one of the states
-        part, flags = 1.0 / hardening(pair), np.empty(at.size)
+        part, flags = 1.0 / stiffness_factor(pair), np.empty(at.size)
         for i in indices(at.size):
             flags[i] = 1.0 * (np.minimum(a.gap[i], b.gap[i]) < part * pair.multipliers[at[i]])
         some = np.nonzero(flags)[0]
@@ -214,14 +214,14 @@ def _relative_travel(pair, u):
 @source
 def touch_of(pair, same, a, b, at):
     """Points between two states, which may be one: :class:`Touch` and :class:`Spot`."""
-    n, part, poses, law = at.size, 1.0 / hardening(pair), pair.poses, pair.law
+    n, part, poses, law = at.size, 1.0 / stiffness_factor(pair), pair.poses, pair.law
     slope, last, away, normal = (np.empty(n, np.complex128), np.empty(n, np.complex128), np.zeros(
         n, np.complex128), np.empty(n, np.complex128))
     before, after, held, k, place, found = np.empty(n), np.empty(n), np.empty(n), np.empty(
         n), np.empty((2, n)), np.empty((6, n))
     moved, gap, slips, slip, trial, spring, missing = np.empty((4, n)), np.empty((4, n)), np.empty(
         (4, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.empty(n)
-    firm = pair.softness[0] * law.stiffness * hardening(pair)
+    stiffness = pair.softness[0] * law.stiffness * stiffness_factor(pair)
     for i in indices(n):
         x0, x1, end, m = a.x[i], b.x[i], b.surface[i], at[i]
         if not same and pair.moving > 0:  # with the obstacle to its middle pose
@@ -230,7 +230,7 @@ def touch_of(pair, same, a, b, at):
             x1, end = x1 + there - end, there
         more = part * pair.multipliers[m]
         before[i], after[i], last[i] = more - a.gap[i], more - b.gap[i], end
-        k[i], held[i] = firm * pair.areas[m], pair.common[BILATERAL] * more
+        k[i], held[i] = stiffness * pair.areas[m], pair.common[BILATERAL] * more
         put(moved, 0, i, x1 - x0)
         put(moved, 1, i, b.t[i] - a.t[i])
         slope[i] = scaled(0.5, a.t[i] + b.t[i])
@@ -251,7 +251,7 @@ def touch_of(pair, same, a, b, at):
             m = at[i]
             away[i] = _from_anchor(poses[NOW], last[i], pair.anchors[m])
             slip[i] = cross(normal[i], away[i])
-            c = anchored * law.stiffness * (1.0 + pair.firmness[0]) * pair.areas[m]
+            c = anchored * law.stiffness * (1.0 + pair.stiffening[0]) * pair.areas[m]
             trial[i] = c * (slip[i] + more * (slip[i] - pair.slips[m]))
             spring[i] = c * (1.0 + more)
     if not same:  # with the work of the change of the gap
@@ -343,7 +343,7 @@ def _settle(pair, same, touch, spot, r, out):
     """Move anchors of slipping points to the limit of sticking; add the work to ``out[0]``."""
     pose, lost, augmented = pair.poses[NOW], np.empty(touch.k.size), pair.law.tolerance > 0.0
     friction = pair.law.friction * np.minimum(pair.common[ANCHORED], 1.0) / (
-        pair.law.stiffness * (1.0 + pair.firmness[0]))
+        pair.law.stiffness * (1.0 + pair.stiffening[0]))
     product(touch.slip, touch.moved, lost)
     for i in indices(lost.size):
         m, n, last, slip = touch.at[i], spot.normal[i], spot.last[i], spot.slip[i]
@@ -368,7 +368,7 @@ def _augment(pair, at, depth, out):
     tolerance, multipliers, largest = pair.law.tolerance, pair.multipliers, pair.largest
     if tolerance == 0.0:
         return
-    where, far, square, k = 0 * at, np.empty(at.size), np.empty(at.size), hardening(pair)
+    where, far, square, k = 0 * at, np.empty(at.size), np.empty(at.size), stiffness_factor(pair)
     for i in indices(at.size):
         before = multipliers[at[i]] / k
         change = np.maximum(depth[i], 0.0) - before

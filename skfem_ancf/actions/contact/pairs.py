@@ -79,7 +79,7 @@ class PairTables(NamedTuple):
     lengths: F1
     spans: F1
     heights: F1
-    firmness: F1
+    stiffness: F1
     reach: F2  # the least and largest zeta of closest points, (2, F)
     near: F1  # distance of a point of a facet from the guess for it
     members: I1
@@ -343,35 +343,36 @@ def _other(t, found, p, e, guess, known):
 
 
 @source
-def _mean_place(t, f0, f1, p, e, s0, s1, wanted):
-    """Where between two places the gap changes as ``wanted``, and what that is over the change."""
+def _mean_place(t, f0, f1, p, e, s0, s1, given):
+    """Where between two places the gap changes as ``given``, and what that is over the change."""
     # The gap is least at the closest point, so there is one.
     low, high = np.minimum(s0, s1), np.maximum(s0, s1)
     x, y = f0.x[p], f1.x[p]
-    below = gap_to(t, f1.curve, e, low, y) - gap_to(t, f0.curve, e, low, x) - wanted
-    above = gap_to(t, f1.curve, e, high, y) - gap_to(t, f0.curve, e, high, x) - wanted
-    zeta, left, going = low, below, np.abs(wanted) >= 0.0
+    below = gap_to(t, f1.curve, e, low, y) - gap_to(t, f0.curve, e, low, x) - given
+    above = gap_to(t, f1.curve, e, high, y) - gap_to(t, f0.curve, e, high, x) - given
+    zeta, left, going = low, below, np.abs(given) >= 0.0
     for _ in range(MEANS):
         slope = above - below
         share = where(slope == 0.0, 0.5, -below / where(slope == 0.0, 1.0, slope))
         zeta = where(going, low + clipped(share, 0.0, 1.0) * (high - low), zeta)
-        left = gap_to(t, f1.curve, e, zeta, y) - gap_to(t, f0.curve, e, zeta, x) - wanted
-        going = going & (np.abs(left) > 1e-3 * np.abs(wanted) + 1e-15 * t.height)
+        left = gap_to(t, f1.curve, e, zeta, y) - gap_to(t, f0.curve, e, zeta, x) - given
+        going = going & (np.abs(left) > 1e-3 * np.abs(given) + 1e-15 * t.height)
         if everywhere(np.logical_not(going)):
             break
         up = left * below > 0.0
         low, below = where(going & up, zeta, low), where(going & up, left, below)
         high, above = where(up, high, where(going, zeta, high)), where(
             up, above, where(going, left, above))
-    change = left + wanted
-    good = (np.abs(wanted) > CLOSE * t.height) & (np.abs(change) > 0.3 * np.abs(wanted))
-    return zeta, where(good, wanted, 1.0) / where(good, change, 1.0)
+    change = left + given
+    good = (np.abs(given) > CLOSE * t.height) & (np.abs(change) > 0.3 * np.abs(given))
+    return zeta, where(good, given, 1.0) / where(good, change, 1.0)
 
 
 @source
 def stiffness_of(t, p, e):
     """Stiffness times area of pairs."""
-    return 0.5 * (1.0 + t.history[0]) * np.minimum(t.firmness[t.of[p]], t.firmness[e]) * t.areas[p]
+    k = np.minimum(t.stiffness[t.of[p]], t.stiffness[e])
+    return 0.5 * (1.0 + t.history[0]) * k * t.areas[p]
 
 
 @source
@@ -439,17 +440,17 @@ def touch_of(t, f0, f1, met):
         np.empty(n), np.zeros(n), np.zeros(n))
     for i in indices(n):
         p, e = met.at[i], met.e[i]
-        s, firm = t.sides[t.of[p]] * t.offsets[t.of[p]], stiffness_of(t, p, e)
+        s, stiffness = t.sides[t.of[p]] * t.offsets[t.of[p]], stiffness_of(t, p, e)
         a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
         by_gap, by_slip = mean_slope(a, b, t.sides[e], s), slip_row(a, b, s)
         for v in range(COMPONENTS // 2):
             put(gap, v, i, by_gap[v])
             put(slip, v, i, by_slip[v])
             put(moved, v, i, b[v] - a[v])
-        k[i] = firm * met.share[i]
+        k[i] = stiffness * met.share[i]
         if t.friction > 0.0:
             path, held, _ = slip_along(t, f1, p, e)
-            trial[i], spring[i] = firm * path, firm * held
+            trial[i], spring[i] = stiffness * path, stiffness * held
     return Touch(met.at, k, met.before, met.after, np.zeros(n), moved, gap, slip, trial, spring)
 
 

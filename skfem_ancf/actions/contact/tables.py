@@ -20,7 +20,7 @@ POSE, POSES = 10, 30
 NOW, BEGIN, END = map(np.int64, range(3))
 #: History data of all pairs: 1 if points stick to anchors; 1 / dt^2 of the last time step; 1 if
 #: points with multipliers are bilateral. Then follow those of :class:`Pair`: ``largest`` and
-#: ``firmness`` of all, the data of points, and at the end the angles of torsional springs.
+#: ``stiffening`` of all, the data of points, and at the end the angles of torsional springs.
 ANCHORED, RATE, BILATERAL, HEAD = range(4)
 #: Flags of history data: anchors, angles of torsional springs, multipliers.
 ANCHORS, TURNS, PRESSURES = 1, 2, 4
@@ -99,7 +99,7 @@ class Pair(NamedTuple):
     softness: F1  # factor on the stiffness for difficult equilibria, (1,)
     common: F1  # of all pairs
     largest: F1  # the largest multiplier
-    firmness: F1  # the factor of hardening less 1
+    stiffening: F1  # what is added to the stiffness, relative to it
     multipliers: F1  # of the augmented Lagrangian, over the stiffness
     anchors: C1  # of friction, in the obstacle's frame
     slips: F1  # distances of points from their anchors
@@ -157,14 +157,14 @@ def weights_of_motion(weights: np.ndarray, dofs: np.ndarray, n: int) -> np.ndarr
 @source
 def transition(pair):
     """Width of the transition; shorter in proportion if the obstacle is stiffened."""
-    return pair.law.width / np.maximum(1.0, 1.0 + pair.firmness[0])
+    return pair.law.width / np.maximum(1.0, 1.0 + pair.stiffening[0])
 
 
 @source
-def hardening(pair):
+def stiffness_factor(pair):
     """Factor on the given stiffness, from loads or time steps."""
     law = pair.law
-    return 1.0 + pair.firmness[0] + law.inertia * pair.common[RATE] / (
+    return 1.0 + pair.stiffening[0] + law.inertia * pair.common[RATE] / (
         pair.softness[0] * law.stiffness)
 
 

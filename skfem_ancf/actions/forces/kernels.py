@@ -33,7 +33,7 @@ TURN = 2.0 * np.pi
 #: For the layout of a band where there is none.
 NONE = np.int64(0)
 #: The span of a mean between two states at one time.
-AT_ONCE = 1e-300
+NO_SPAN = 1e-300
 
 
 class Kinds(NamedTuple):
@@ -350,7 +350,7 @@ def element_damping(tables, t, u, v, D):
 
 
 @source
-def put_between(tables, D, factor, first, S):
+def put_far_stiffness(tables, D, factor, first, S):
     """Put derivatives of distant couplings times a factor between their rows, from ``first`` on."""
     k = S.shape[0] - first
     between = np.zeros(k * k)

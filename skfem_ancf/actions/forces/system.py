@@ -333,7 +333,7 @@ class Forces:
         element_stiffness(tables, t, u, v, factor, D)
         return D
 
-    def firmnesses(self, tables: ForceTables, u: Array) -> Array:
+    def stiffness_norms(self, tables: ForceTables, u: Array) -> Array:
         """Largest eigenvalue of the stiffness of each element, shape (k,)."""
         D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
         return np.array([np.linalg.norm(D[numbers], 2) for numbers in self._blocks])

@@ -10,7 +10,7 @@ from ...beam.kernels.section import beam_gradients
 from ...beam import Layout, WhichBeam, select_beam
 from ...core import (Array, ModelWarning, ask_array, gauss_lobatto, refuse, require_function,
                      require_integer, require_not_negative, require_option, require_positive, warn)
-from ..contact.contacts import FIRMER, Group
+from ..contact.contacts import LARGEST_FACTOR, Group
 from ..contact.tables import Law, carried, taken_back
 from ..forces.base import ForceElement, KernelElement
 from ..places import Vector
@@ -196,13 +196,13 @@ class Obstacle(ForceElement):
         radius = np.hypot(*(places - places.mean(axis=2, keepdims=True))).ravel() + np.abs(offsets)
         E, density = stiffest(beam.across, np.arange(mesh.nelements))
         k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
-        firmest = 1.0 if self.penalty or augmented else FIRMER * max(1.0, E / (h * k))
+        factor = 1.0 if self.penalty or augmented else LARGEST_FACTOR * max(1.0, E / (h * k))
         law = Law(k, self.width or WIDTH * h, self.friction, self.damping,
                   HARDER * density * h * augmented, float(radius.max()),
                   -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented)
         return Group(nodes, weights, slopes, areas, offsets, starts, mesh.nelements + 2, m,
                      np.inf if self.shape.inner == np.inf else THROUGH * min(h, self.shape.inner),
-                     h, law, firmest)
+                     h, law, factor)
 
     def _along(self, beam):
         """Points and weights along the elements of a beam."""

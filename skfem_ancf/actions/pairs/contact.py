@@ -23,7 +23,7 @@ from .search import BETWEEN, Search, Surfaces
 WIDTH = 1e-3
 #: Penetration in heights at which a default stiffness is increased, the one aimed at, and the
 #: largest factor.
-DEEP, AIM, FIRMEST = 0.01, 0.005, 1e4
+DEEP, AIM, STIFFEST = 0.01, 0.005, 1e4
 #: Of loose members: largest decrease of the stiffness in an increment, smallest stiffness, and the
 #: depth relative to the one aimed at from which on it stays.
 SOFTER, SOFTEST, PRESSED = 0.1, 1e-4, 0.3
@@ -125,7 +125,7 @@ class BodyContact(ForceElement):
         self.dofs = np.unique(f.dofs)
         f = f._replace(dofs=np.searchsorted(self.dofs, f.dofs))
         surfaces = Surfaces(f)
-        if not np.isfinite(f.firmness).any() and self.penalty is None:
+        if not np.isfinite(f.stiffness).any() and self.penalty is None:
             raise InputError(f"{self!r} has no beam, whose modulus would give a stiffness: give "
                              "stiffness=, a pressure per penetration")
         solids = [(k, _inside(layout.members[k], origin)) for k in used if k not in beams]
@@ -235,7 +235,7 @@ class BodyContact(ForceElement):
 
     def corrected(self, x: Array, t: float, history: Array) -> Array | None:
         found, at, deep = self._depth(x)
-        if self.penalty is not None or deep <= DEEP or history[0] >= FIRMEST:
+        if self.penalty is not None or deep <= DEEP or history[0] >= STIFFEST:
             return None
         return self._stiffened(history, found, at, max(deep / AIM, 2.0))
 

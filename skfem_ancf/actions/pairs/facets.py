@@ -30,8 +30,8 @@ class Facets(NamedTuple):
     ``members``, ``chains`` and ``curves`` are numbers of their members, of the chains of these, and
     of smooth parts of their surfaces; ``places`` and ``lengths`` where facets begin along these and
     how long they are, ``spans`` that along an axis. ``heights`` is how thick the member is,
-    ``firmness`` its pressure per penetration, infinite if not known. Points have a facet, ``zeta``,
-    and an area, per width for bodies and domains."""
+    ``stiffness`` its pressure per penetration, infinite if not known. Points have a facet,
+    ``zeta``, and an area, per width for bodies and domains."""
 
     dofs: Array  # (F, B)
     weights: Array  # coefficients of powers of zeta, (F, B, n)
@@ -45,7 +45,7 @@ class Facets(NamedTuple):
     lengths: Array
     spans: Array
     heights: Array
-    firmness: Array
+    stiffness: Array
     ends: Array  # zeta of the ends of the facet before its corners were rounded, (F, 2)
     of: Array  # facets of points, (P,)
     zeta: Array
@@ -161,7 +161,7 @@ def _arc(f, zeta, a, b, last, first, handle, curve):
         np.pad(fit @ places, (0, n - 4))[None], sides=np.array([side]), offsets=np.zeros(1),
         members=f.members[[e]], chains=f.chains[[e]], curves=np.array([curve]),
         places=f.places[[e]], lengths=np.array([np.abs(places[3] - places[0])]),
-        spans=np.zeros(1), heights=f.heights[[e]], firmness=f.firmness[[e]],
+        spans=np.zeros(1), heights=f.heights[[e]], stiffness=f.stiffness[[e]],
         ends=np.array([[-2.0, 2.0]]), of=np.zeros(0, int), zeta=np.zeros(0), areas=np.zeros(0))
 
 
@@ -191,7 +191,7 @@ def _of_beam(beam):
     refuse(not beam.has_sections and mesh.heights is not None, "contact knows cables of constant "
            "height only, not {!r}: take an element with sections, as ElementBeamANCF(2)", beam)
     E = stiffest(beam.across, np.arange(mesh.nelements))[0]
-    common = {"heights": mesh.height, "firmness": E / mesh.height}
+    common = {"heights": mesh.height, "stiffness": E / mesh.height}
     dofs = mesh.t[0][:, None] * (beam.nd // 2) + np.arange(beam.nd)
     ends = np.append(np.flatnonzero(np.diff(mesh.chains)), mesh.nelements - 1)
     begins = np.append(0, ends[:-1] + 1)
@@ -232,7 +232,7 @@ def _of_body(body):
     n = int(np.clip(np.ceil(np.max(np.abs(np.diff(ends))) / thick), 1, PARTS))
     yield _facets(np.tile([0, 1], (F, 1)), weights, _complex(body.position) + turn * ends,
                   np.array([-1.0, 1.0]), _repeated(n), 1.0, sides=-1.0, heights=thick,
-                  firmness=np.inf)
+                  stiffness=np.inf)
 
 
 def _of_domain(domain):
@@ -250,7 +250,7 @@ def _of_domain(domain):
     weights = np.take_along_axis(weights, kept[..., None], axis=0).transpose(1, 0, 2)
     thick = min(np.ptp(x.real), np.ptp(x.imag))
     yield _facets(np.take_along_axis(dofs, kept, axis=0).T, weights, x, nodes, _rule(n + 1), 1.0,
-                  sides=side, heights=thick, firmness=np.inf)
+                  sides=side, heights=thick, stiffness=np.inf)
 
 
 def _rule(n):

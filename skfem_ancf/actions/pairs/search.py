@@ -94,10 +94,10 @@ class Search:
         self.joined = self._joined(solids)
         penalty, width, friction = numbers
         of_facets = {name: _packed(getattr(f, name), kind) for kind, names in (
-            (float, "sides offsets places lengths spans heights firmness zeta areas"),
+            (float, "sides offsets places lengths spans heights stiffness zeta areas"),
             (np.int64, "members chains curves of")) for name in names.split()}
         if penalty is not None:
-            of_facets["firmness"] = np.full(len(f.sides), penalty)
+            of_facets["stiffness"] = np.full(len(f.sides), penalty)
         self.tables = PairTables(
             used=np.arange(n), dofs=_packed(f.dofs.T, np.int64),
             weights=_packed(f.weights.transpose(1, 2, 0), complex),

@@ -247,7 +247,7 @@ class Elements:
         M[np.arange(len(s)), n * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
         return sparse.csr_matrix(M.reshape(len(s), -1))
 
-    def _between(self, D):
+    def _moduli_of_samples(self, D):
         """Moduli (nq, ne) between samples from those at the points, as if they were symmetric."""
         M, D = self._to_moduli, (D * self.weights).reshape(-1, self.ne)
         return M @ D if self.t.along.ndim == 2 else np.einsum("epq,pe->qe", M, D)
@@ -258,7 +258,7 @@ class Elements:
             return self.linear_stress(strain), self.moduli
         both = np.empty((12, len(self.t.along) // 3, self.ne))
         law_evaluate(self.t.law, self.at_points(strain), both)
-        return self._weighted(both[:3]), self._between(both[3:])
+        return self._weighted(both[:3]), self._moduli_of_samples(both[3:])
 
     def moduli_at(self, strain: Array, shift: Array | None = None) -> Array:
         """Moduli (nq, ne) between samples, or their change by a shift as in :meth:`stress`."""
@@ -271,7 +271,7 @@ class Elements:
             still, D = D, np.empty_like(D)
             law_evaluate(self.t.law, E + shift, D)
             D -= still
-        return self._between(D)
+        return self._moduli_of_samples(D)
 
     # force
 

@@ -383,7 +383,7 @@ class ElementsWithHistory(Elements):
 
     def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
         S, D, _ = self.evaluate(self.at_points(strain))
-        moduli = self._between(D)
+        moduli = self._moduli_of_samples(D)
         self._known = (strain.copy(), moduli, self.now.copy(), self.history.copy(),
                        float(self.span[0]))
         return self._weighted(S), moduli
@@ -393,7 +393,7 @@ class ElementsWithHistory(Elements):
         if dt == self.span[0] and np.array_equal(now, self.now) and np.array_equal(
                 history, self.history) and np.max(np.abs(strain - E)) <= SAME * np.max(np.abs(E)):
             return moduli
-        return self._between(self.evaluate(self.at_points(strain))[1])
+        return self._moduli_of_samples(self.evaluate(self.at_points(strain))[1])
 
     def strain_at(self, u: Array) -> Array:
         """Strain at the integration points, (c, points, ne)."""
