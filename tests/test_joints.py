@@ -5,24 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import trapezoid
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        Scene, StVenantKirchhoff)
+from elbow import between, joint_examples
+from skfem_ancf import (Beam, ElementBeamANCFCubic, ElementBeamCable, MeshBeam, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.actions.joints import JOINTS
 from skfem_ancf.core.errors import InputError, ModelWarning, NameUnknown, SupportError
 
 E, NU, RHO = 1e6, 0.3, 1000.0
 GRAVITY = (0.0, -9.81)
-
-
-def between(a, b, ne=2, order=2, h=0.1, E=E, nu=NU, rho=RHO, width=0.1, name=None, element=None,
-            formulation="assumed"):
-    """A straight beam from a to b."""
-    a, b = np.array(a, dtype=float), np.array(b, dtype=float)
-    d = b - a
-    mesh = MeshBeam.init_line(np.linspace(0, np.hypot(*d), ne + 1), h, origin=a,
-                              angle=np.arctan2(d[1], d[0]))
-    return Beam(mesh, element or ElementBeamANCF(order), StVenantKirchhoff(E, nu, rho), width,
-                formulation=formulation, name=name)
 
 
 def elbow(**options):
@@ -31,20 +21,7 @@ def elbow(**options):
             between((1, 0), (1.4, 0.9), 3, 3, h=0.15, width=0.07, name="forearm", **options))
 
 
-#: How to make each joint of the registry on the elbow.
-CASES = {
-    "hinge": dict(beams=("arm", "forearm"), at=(1, 0)),
-    "weld": dict(beams=("arm", "forearm"), at=("right", "left")),
-    "line": dict(beam="arm", at=(0.3, 0.02), direction=(1, 2)),
-    "circle": dict(beam="forearm", at=(1.2, 0.45), center=(0.4, 0.1)),
-    "position": dict(beam="arm", at=(0.4, -0.03), r=lambda t: (0.4 + np.sin(t), t * t - 0.03)),
-    "angle": dict(beam="forearm", at="right", angle=lambda t: np.sin(3 * t)),
-    "turn": dict(at=("arm", "left"), other=("forearm", "right"), angle=lambda t: np.sin(3 * t)),
-    "plane": dict(beam="forearm", at="left"),
-    "sleeve": dict(at=("ground", (1.2, 0.45)), on="forearm", angle=True),
-    "slot": dict(at=("arm", (0.3, 0.02)), on="ground", direction=(1, 2), angle=True),
-}
-
+CASES = joint_examples()
 #: Joints whose equations are not quadratic in the coordinates, and a step of differences for them.
 CURVED, STEP = (JOINTS["sleeve"],), 1e-4
 
@@ -94,21 +71,6 @@ def test_curvature_is_the_derivative_of_the_jacobian(joint):
     assert np.allclose(C @ v, along, rtol=0, atol=tol)
     assert joint.constant == (not np.any(joint.jacobian(u + v, t + 0.1) - joint.jacobian(u, t)))
     assert joint.moving == bool(np.any(joint.value(u, t + 0.1) - joint.value(u, t)))
-
-
-# the linear systems of statics
-
-
-def held(name, pressure=False):
-    """The elbow with a joint, and as few supports and other joints as hold it."""
-    scene = Scene(*elbow()).gravity(GRAVITY)
-    if name not in ("hinge", "weld"):
-        scene.joint("hinge", **CASES["hinge"])
-    scene.joint(name, **CASES[name])
-    scene.clamp("left", beam="arm")
-    if pressure:
-        scene.pressure("top", 10.0, beam="forearm")
-    return scene
 
 
 # conservation and drift

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+import elbow
 from noise import alike
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, MeshBeam, RigidBody, Scene, Section,
-                        StVenantKirchhoff)
+                        ElementBeamPatelShabana, MeshBeam, RigidBody, Scene, Section)
 from skfem_ancf.actions.joints import JOINTS
 
 #: Lengths of a beam in metres, beside one metre.
@@ -22,49 +22,32 @@ def between(a, b, ne, L, element, h, name=None):
     That of mass is L^3, that of time one second.
     """
     a, b = L * np.array(a, dtype=float), L * np.array(b, dtype=float)
-    d = b - a
-    mesh = MeshBeam.init_line(np.linspace(0, np.hypot(*d), ne + 1), L * h, origin=a,
-                              angle=np.arctan2(d[1], d[0]))
-    return Beam(mesh, element, StVenantKirchhoff(1e6 * L * L, 0.3, 1000.0), 0.1 * L, name=name)
+    return elbow.between(a, b, ne, h=L * h, E=1e6 * L * L, width=0.1 * L, element=element,
+                         name=name)
 
 
-def elbow(name, L, kind):
+def jointed(name, L, kind):
     """Two beams, clamped at an angle, with a joint of each kind of the registry, or a dashpot."""
     arm, forearm = KINDS[kind]()
-    x, y = 0.02 * np.array([-0.3, 1.0])  # off the axis
-
-    def p(a, b):
-        return L * a, L * b
-
-    cases = {
-        "hinge": None, "weld": None,
-        "line": dict(beam="arm", at=p(0.3 + x, 0.09 + y), direction=(1, 2)),
-        "circle": dict(beam="forearm", at=p(1.2, 0.75), center=p(0.4, 0.1)),
-        "position": dict(beam="arm", at=p(0.4 - x, 0.12 - y),
-                         r=lambda t: p(0.4 + 0.005 * np.sin(t) - x, 0.12 + 0.01 * t * t - y)),
-        "angle": dict(beam="forearm", at="right", angle=lambda t: 0.1 * np.sin(3 * t)),
-        "turn": dict(at=("arm", "left"), other=("forearm", "right"),
-                     angle=lambda t: 0.1 * np.sin(3 * t)),
-        "plane": dict(beam="forearm", at="left"),
-        "sleeve": dict(at=("ground", p(1.2, 0.75)), on="forearm", angle=True),
-        "slot": dict(at=("arm", p(0.3 + x, 0.09 + y)), on="ground", direction=(1, 2), angle=True),
-        "dashpot": None}
-    assert set(cases) == {*JOINTS, "dashpot"}
+    cases = elbow.joint_examples(L, 0.3, 0.005, 0.1)
+    assert set(cases) == set(JOINTS)
     turns = name in ("hinge", "plane")
     scene = Scene(between((0, 0), (1, 0.3), 2, L, arm, 0.1, "arm"),
                   between((1, 0.3), (1.4, 1.2), 3, L, forearm, 0.15, "forearm"))
     scene.gravity((0.0, -0.3 * L)).clamp("left", beam="arm", thickness="free")
-    scene.joint("hinge" if turns else "weld", beams=("arm", "forearm"), at=p(1, 0.3))
-    if cases[name]:
+    held = "hinge" if turns else "weld"
+    scene.joint(held, **cases[held])
+    if name not in ("hinge", "weld", "dashpot"):
         scene.joint(name, **cases[name])
     if turns or name == "dashpot":
-        scene.spring(300.0 * L**3, between=(p(1.4, 1.2), p(1.9, 1.2)), damping=20.0 * L**3)
+        scene.spring(300.0 * L**3, between=((1.4 * L, 1.2 * L), (1.9 * L, 1.2 * L)),
+                     damping=20.0 * L**3)
     return scene
 
 
 def found(name, L, kind, scheme):
     """Displacement of the tip over L, and the number of iterations."""
-    scene, tip = elbow(name, L, kind), (1.4 * L, 1.2 * L)
+    scene, tip = jointed(name, L, kind), (1.4 * L, 1.2 * L)
     if scheme is None:
         state = scene.solve_static()
         return state.displacement(tip) / L, state.iterations
