@@ -2,6 +2,8 @@
 
 import copy
 import pickle
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +19,9 @@ from skfem_ancf.actions.contact import kernels, pairs
 from skfem_ancf.actions.contact.tables import is_clear
 from skfem_ancf.actions.obstacles import Circle, Line
 from skfem_ancf.beam.layout import Layout
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+import stress
 
 ELEMENTS = (ElementBeamANCF(2), ElementBeamANCFCubic(1), ElementBeamCable(3), ElementBeamCable(5))
 STEEL = StVenantKirchhoff(2e11, 0.0, 7800.0)
@@ -277,39 +282,24 @@ def test_a_ring_is_pressed_flat_until_it_touches_itself():
     assert len(state.contact()) and state.contact().penetration < 0.01 * h
 
 
-def squeezed(n, friction):
-    """Wires on each other in a box whose lid comes down by half of the height: the run, and h."""
-    h, rng = 0.02, np.random.default_rng(3)
-    wires = [Beam(MeshBeam.init_curve(
-        lambda s, c=c, k=k: np.array([s, (3.6 * k + 1.2 * np.sin(2 * np.pi * s + c)) * h]),
-        np.linspace(0, 1, 5), height=h), ElementBeamCable(3), StVenantKirchhoff(1e6, 0.0, 1.0),
-        width=1.0) for k, c in enumerate(rng.uniform(0, 2 * np.pi, n))]
-    scene, low, top = Scene(*wires).contact("all", friction=friction), -1.8 * h, (3.6 * n - 1.8) * h
-    for point, normal in (((-0.02, 0), (1, 0)), ((1.02, 0), (-1, 0)), ((0, low), (0, 1))):
-        scene.obstacle(Line(point, normal))
-    scene.obstacle(Line((0, top), (0, -1)), position=lambda t: (0.0, -0.5 * t * (top - low)))
-    run = scene.run(1.0, increments=20)
-    state = run.state(-1)
-    y = np.array([state.u[s][1::4] + b.mesh.p[1] for s, b in zip(scene.system.slices, wires)])
-    assert np.all(np.diff(y, axis=0) > 0.5 * h)  # no wire has passed through another one
-    return run, h
+def crossed(run):
+    """True if a wire of :func:`stress.squeezed` has passed through another one."""
+    state, system = run.state(-1), run.system
+    y = np.array([state.u[s][1::4] + b.mesh.p[1] for s, b in zip(system.slices, system.beams)])
+    return not np.all(np.diff(y, axis=0) > 0.01)
 
 
 def test_wires_that_nothing_holds_are_squeezed_in_a_box():
-    run, h = squeezed(3, 0.0)
-    state = run.state(-1)
-    assert state.contact().penetration < 0.01 * h
-    floor, lid = (state.contact(k).total[1] for k in (2, 3))
-    assert lid < -1.0 and abs(floor + lid) < -0.06 * lid  # the rest is drag
+    run, deepest, (_, _, floor, lid) = stress.squeezed(3, 0.0)
+    assert deepest < 0.01 and not crossed(run)
+    assert lid[1] < -1.0 and abs(floor + lid)[1] < -0.06 * lid[1]  # the rest is drag
 
 
 def test_wires_with_friction_are_squeezed_in_a_box(needs_compiled):
-    run, h = squeezed(4, 0.2)
-    assert run.t[-1] == 1.0 and max(state.contact().penetration for state in run) < 0.01 * h
-    state = run.state(-1)
-    force = np.sum([state.contact(k).total for k in range(4)], axis=0)
-    assert state.contact(3).total[1] < -1.0 and np.all(np.diff(run.dissipated) >= -1e-6)
-    assert np.abs(force).max() < -0.15 * state.contact(3).total[1]  # the rest is drag
+    run, deepest, walls = stress.squeezed(4, 0.2)
+    assert run.t[-1] == 1.0 and deepest < 0.01 and not crossed(run)
+    assert walls[3, 1] < -1.0 and np.all(np.diff(run.dissipated) >= -1e-6)
+    assert np.abs(walls.sum(axis=0)).max() < -0.15 * walls[3, 1]  # the rest is drag
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
