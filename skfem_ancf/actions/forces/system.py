@@ -57,8 +57,10 @@ class Forces:
     distant = couples_far = resists = False
     symmetric = True
     contacts = Contacts((), 0)
-    #: Entries of the last tangent of a step: rows, columns and values.
+    #: Entries of the last tangent of a step: rows, columns and values. Those of the last tangent of
+    #: changing elements, and what they were computed from.
     kept: Any = NONE, NONE, np.zeros(0)
+    _last: Any = None, ()
 
     def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
@@ -353,9 +355,14 @@ class Forces:
                          factor: float = 0.0) -> tuple[Array, Array, Array]:
         """Rows, columns and values (k,) of the stiffness of changing elements, of the mean force
         between two displacements if these are two arrays. Plus a factor times the resistance."""
-        found = [(NONE, NONE, np.zeros(0))]
+        found: list[Any] = [(NONE, NONE, np.zeros(0))]
         if is_clear(self.clear, u0, 0.0) and is_clear(self.clear, u1, 0.0):
             return found[0]
+        # a line search, and products, ask at the displacements of the last factors
+        by = np.concatenate([u0, u1, [t, factor, u0 is u1], [] if v is None else v, *(
+            x for one in self.remembering for x in (one.values, one.span))])
+        if np.array_equal(by, self._last[1]):
+            return self._last[0]
         for element, at in self.changing:
             x, y = (u[at].reshape(-1, 2) for u in (u0, u1))
             w = 0.0 * x if v is None else v[at].reshape(-1, 2)
@@ -364,7 +371,8 @@ class Forces:
                 K = K + factor * element.resistance(0.5 * (x + y), w, t)
             K = sparse.coo_array(K)
             found.append((at[K.row], at[K.col], -K.data))
-        return tuple(np.concatenate(x) for x in zip(*found))  # type: ignore[return-value]
+        self._last = tuple(np.concatenate(x) for x in zip(*found)), by
+        return self._last[0]
 
     def corrected(self, u: Array, t: float) -> bool:
         """Change histories with which an increment is to be repeated; True if there are any."""
