@@ -698,7 +698,7 @@ def wires(quick, out):
         _, deepest, (_, _, floor, lid) = squeezed(n, friction, n == 20)
         case = f"{n} wires, friction {friction}"
         yield Row("wires", case, "penetration over height", deepest, 1e-2)
-        # friction of the ends on the side walls, and the drag of what is loose
+        # the drag of what is loose in the last increment, see tests/test_pairs.py
         yield Row("wires", case, "difference of floor and lid", (floor + lid)[1] / lid[1], 0.15)
 
 
