@@ -45,9 +45,9 @@ SLOW, PATIENCE = 1e-2, 30
 #: then relative to that at the last rate, or to the size.
 FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
 #: Drag of loose beams relative to their softest bending, that of a free beam over E I / L^4; its
-#: least value per length and width, relative to E; factors for an increment that fails. Iterations
-#: from a guess, and least number of those allowed otherwise: contacts open and close in turn.
-DRAG, FREE, LEAST_DRAG, MORE_DRAG, GUESSED, LOOSE = 0.02, 500.0, 1e-9, (10.0, 100.0, 1e3), 15, 60
+#: least value per length and width, relative to E; factors for an increment that fails. Least
+#: number of iterations allowed: contacts open and close in turn.
+DRAG, FREE, LEAST_DRAG, MORE_DRAG, LOOSE = 0.02, 500.0, 1e-9, (10.0, 100.0, 1e3), 60
 
 
 # named steps of a quasi-static run
@@ -372,13 +372,14 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
 def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticResult,
            options: Options, smallest: bool) -> Instant:
     """The equilibrium at t of loose members that may touch, with the drag of :func:`drag_of`."""
-    # First from a guess by the last change. The smallest increment is tried with more drag, with
-    # which bodies snap through in several increments.
+    # From a guess by the last change, then from the last equilibrium: there nothing that the lid
+    # presses moves yet, and contacts open and close in turn for longer. The smallest increment is
+    # tried with more drag, with which bodies snap through in several increments.
     dt, u = t - last.t, last.result.u
     start.memory = system.histories.after(start.memory).relaxed(u)
     options = options._replace(most=max(options.most, LOOSE))
     tries: list[Any] = [] if last.velocity is None else [
-        options._replace(drag=drag, guess=u + dt * last.velocity, most=min(GUESSED, options.most))]
+        options._replace(drag=drag, guess=u + dt * last.velocity)]
     tries += [options._replace(drag=factor * drag, method="newton")
               for factor in (1.0, *(MORE_DRAG if smallest else ()))]
     for k, one in enumerate(tries):
