@@ -15,8 +15,9 @@ from skfem.helpers import ddot, sym_grad
 from skfem_ancf import (Beam, BodyContact, Domain, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.actions.bound import recalled
-from skfem_ancf.actions.contact import kernels, pairs
+from skfem_ancf.actions.contact import contacts, kernels, pairs
 from skfem_ancf.actions.contact.tables import is_clear
+from skfem_ancf.actions.forces import kernels as pair_forces, system as forces_of_scene
 from skfem_ancf.actions.obstacles import Circle, Line
 from skfem_ancf.beam.layout import Layout
 from skfem_ancf.scene.quasistatic import drag_of
@@ -441,19 +442,52 @@ def test_nothing_touches_within_the_margin(element):
     system = scene.obstacle(Line((0.0, -1.5 * h), (0.1, 1.0))).system
     forces, N = system.forces, system.N
     apart = [s for beam, s in zip(system.beams, system.slices)]
-    for table in (forces.clear, forces.contacts.tables.clear):
-        margin, weights = table[0], np.maximum(table[-N:], 1e-3)
-        assert 0.3 * h < margin < 0.5 * h  # 0.4 of the gap
-        towards = np.zeros(N)  # translations are the shortest way
+    for table, part in ((forces.clear, 0.45), (forces.contacts.tables.clear, 0.9)):
+        margin, weights = table[0], table[-N:].reshape(2, -1)
+        assert 0.7 * part * h < margin < 1.1 * part * h
+        towards = np.zeros(N // 2, complex)  # translations are the shortest way
         for s, way in zip(apart, (1.0, -1.0, 1.0)):
-            towards[s.start + 1:s.stop:system.beams[0].nd] = way * h
-        for sign in (towards, *rng.choice([-1.0, 1.0], (20, N))):
-            u = sign / np.abs(weights * sign).max() * margin if sign is towards else (
-                margin * sign / weights)
+            towards[s.start // 2:s.stop // 2:system.beams[0].nd // 2] = 1j * way
+        ways = [towards / np.max(weights[0])]
+        for share in rng.random(20):  # of places in the motion
+            sizes = np.where(weights[0] > 0.0, share, 1.0 - share) / np.maximum(
+                np.max(weights, axis=0), 1e-3)
+            ways.append(sizes * np.exp(2j * np.pi * rng.random(N // 2)))
+        for way in ways:
+            u = margin * way.view(float)
             assert is_clear(table, 0.999 * u, 0.0) and not is_clear(table, 1.001 * u, 0.0)
             least = forces._least_gap(0.999 * u) if table is forces.clear else min(
                 gap.min() for _, _, gap in forces.contacts.look(0.999 * u, 0.0))
             assert least > 0.0
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_contact_is_that_of_a_search_in_each_evaluation(monkeypatch, friction):
+    """Also of fast, thin members; what is not looked at does not touch."""
+    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "0")
+    h, soft = 0.002, ElementBeamANCF(2)
+
+    def solved():
+        leaves = [line(0.5, 6, h, (0.0, -6.0 * h * k), soft) for k in range(2)]
+        scene = Scene(*leaves).contact("all", friction=friction).clamp("left", 0).clamp("left", 1)
+        scene.obstacle(Circle((0.4, -0.25), 0.22), friction=friction)
+        scene.point_force((0.0, -0.5), at=(0.5, 0.0), beam=0, amplitude=lambda t: t)
+        thrown = Scene(line(0.1, 3, h, (0.0, 0.05), soft, RUBBER, angle=0.2),
+                       line(0.4, 6, h, (-0.1, 0.0), soft, RUBBER)).contact("all", friction=friction)
+        thrown.initial_velocity((1.0, -6.0), 0).clamp("left", 1).clamp("right", 1)
+        thrown.obstacle(Circle((0.1, -0.025), 0.02), friction=friction)
+        schemes = "energy-momentum", "generalized-alpha"
+        runs = [scene.run(1.0, increments=6),
+                *(thrown.integrate(0.014, 2e-4, scheme=scheme) for scheme in schemes)]
+        return [scene.solve_static().u, *(one.u for one in runs)], [
+            len(one.state(-1).contact()) > 0 for one in runs]
+
+    found, touches = solved()
+    assert any(touches)
+    for module in (kernels, contacts, pair_forces, forces_of_scene):
+        monkeypatch.setattr(module, "SAFE", 0.0)
+    for a, b in zip(found, solved()[0]):
+        assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(b).max())
 
 
 def test_what_does_not_touch_is_seldom_looked_at(monkeypatch):

@@ -560,6 +560,13 @@ def smallest(x):
 
 
 @primitive("skfem_ancf.core.loops")
+def farthest(weights, u, seen):
+    """The largest distances of pairs u from seen (2 n,), by each row of weights (2, n), added."""
+    places, others = np.maximum.reduce(weights * np.abs((u - seen).view(complex)), 1, initial=0.0)
+    return places + others
+
+
+@primitive("skfem_ancf.core.loops")
 def largest(x):
     """Largest absolute value, 0 if empty."""
     return np.max(np.abs(x), initial=0.0)

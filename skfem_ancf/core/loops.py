@@ -322,6 +322,17 @@ def smallest(x):
     return found
 
 
+def farthest(weights, u, seen):
+    total = 0.0
+    for row in weights:
+        square = 0.0
+        for k in range(row.size):
+            x, y = row[k] * (u[2 * k] - seen[2 * k]), row[k] * (u[2 * k + 1] - seen[2 * k + 1])
+            square = np.maximum(square, x * x + y * y)
+        total += np.sqrt(square)
+    return total
+
+
 def largest(x):
     found = 0.0
     for i in range(x.size):

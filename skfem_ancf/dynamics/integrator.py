@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.contact.tables import HAS_ENTRIES
+from ..actions.contact.tables import HAS_ENTRIES, PASSED
 from ..actions.obstacles.contact import may_touch
 from ..actions.tables import constraint, joint_directions
 from ..core.band import SPARE, Band, BandMatrix, Coupling, coupling, factorize, fix, solve
@@ -300,6 +300,7 @@ class Integrator:
             self._nodes or self._couplings))
         try:
             s.histories.put(y.history)
+            s.forces.clear[PASSED] = float(function is not steps)
             with np.errstate(all="ignore"):
                 done = call(self._matrices, *args)
         except BaseException as error:  # the motion may continue from y
@@ -309,12 +310,13 @@ class Integrator:
                 raise
             done, self.stopped = int(np.argmax(np.append(np.isnan(out[1]), True))), True
         done, self._lost = s.constraints.first_lost(rows[:done, 0])
-        if done and s.forces.contacts.sweeps:
+        may_pass = done > 0 and s.forces.clear[PASSED] > 0.0
+        if may_pass and s.forces.contacts.sweeps:
             u, v = (np.concatenate([[x], rows[:done, k]]) for k, x in enumerate((y.u, y.v)))
             done, passed = s.forces.contacts.sweep.first(u, v, y.t + dt * np.arange(len(u)))
             if passed:
                 self._lost = f"the step jumps over the obstacle {passed}"
-        if done and s.forces.changing:
+        if may_pass and done and s.forces.changing:
             done = self._first_passed(y, rows, done, dt)
         if done < len(rows):
             self.forget()

@@ -17,8 +17,8 @@ import numpy as np
 
 from ..actions.contact.tables import PRESSURES
 from ..actions.forces.kernels import (add_contact_tangent, add_elastic_force, add_friction_tangent,
-                                      augment_contact, element_stiffness, keep_entries,
-                                      put_far_stiffness, set_contact_rate)
+                                      augment_contact, count_passed, element_stiffness,
+                                      keep_entries, put_far_stiffness, set_contact_rate)
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_curvature_force, add_joint_force,
                               add_load_stiffness, add_products, carry_eigenstrains, constraint,
                               joint_directions, mean_external_force)
@@ -369,6 +369,8 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
                    taken)
             state.dissipated[0] += taken[0]
             copy(e.history, memories[n, 1:])
+        if contacts.number > 0 or e.forces.changing > 0:
+            count_passed(e.forces, w.y[0], w.x.u)
         # the end of the step becomes the start of the next
         copy(w.x.u, w.y[0])
         copy(w.x.v, w.y[1])

@@ -99,17 +99,20 @@ class Rules(NamedTuple):
     mixed: bool  # the geometric part uses independent stresses
     iterations: int  # largest number
     tol: float
+    rough: float  # the same where obstacles or members may touch
     noise: float  # round-off of the size of a correction
     force_noise: float  # round-off of the residual
     give_up: int  # NEVER, BY_THIRD or BY_SECOND_OR_LATE
 
 
-def rules_of(system: Any, method: str, tol: float, most: int, give_up: int = NEVER) -> Rules:
-    """The :class:`Rules` of a system; ``most`` is the largest number of iterations."""
+def rules_of(system: Any, method: str, tol: float, most: int, give_up: int = NEVER,
+             rough: float = 0.0) -> Rules:
+    """The :class:`Rules` of a system; ``most`` is the largest number of iterations. ``rough`` is a
+    larger tolerance where something may touch."""
     scales = system.scales
     # the residual has the round-off of all DOFs, the work that of the strains
-    return Rules(method == "mixed", most, tol, 8.0 * scales.work_noise, 8.0 * scales.force_noise,
-                 give_up)
+    return Rules(method == "mixed", most, tol, max(tol, rough), 8.0 * scales.work_noise,
+                 8.0 * scales.force_noise, give_up)
 
 
 @source

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ..actions.forces.kernels import (NO_SPAN, add_elastic_force, add_element_tangent,
-                                      contact_along, contact_work, nothing_touches)
+                                      contact_along, contact_work, way_is_clear)
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
@@ -172,20 +172,20 @@ def mean_stiffness(diagonal, sizes):
 LEFT, TRIES, PARTS = 0.5, 12, 16
 
 
-@apart("contacts", Equations, float, float, F1, F1, F1, F1)
-def hold_back(e, t, loose, u, R, du, dm):
-    """Line search for a correction that runs into obstacles; scales du and dm."""
+@apart("contacts", Equations, float, float, bool, F1, F1, F1, F1, returns=int)
+def hold_back(e, t, loose, clear, u, R, du, dm):
+    """Line search for a correction that runs into obstacles; scales du and dm. Returns 1 if it is
+    known that nothing touches at its end, as at u if ``clear``."""
     # If ``loose`` is 1, bodies move by no more than an interval, as nothing but contact stops them.
     # The residual along the correction, of the equations linearised without contact plus the actual
     # contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close
     # in turn.
-    work, two, scratch, ahead = dot(R, du), np.empty(2), np.zeros(u.size), u.copy()
-    add_multiple(1.0, du, ahead)
-    if loose == 0.0 and nothing_touches(e.forces, u) and nothing_touches(e.forces, ahead):
-        return
+    work, two, scratch = dot(R, du), np.empty(2), np.zeros(u.size)
+    if loose == 0.0 and clear and way_is_clear(e.forces, t, u, du, scratch):
+        return 1
     contact_along(e.forces, t, u, du, two)
     if not work > 0.0 and loose == 0.0:
-        return
+        return 0
     parts, most = int(min(max(np.ceil(two[1]), 1.0), PARTS)), 1.0
     if loose > 0.0 and two[1] > 1.0:
         parts, most = 1, 1.0 / two[1]
@@ -212,6 +212,7 @@ def hold_back(e, t, loose, u, R, du, dm):
         du[i] *= s
     for k in indices(dm.size):
         dm[k] *= s
+    return 0
 
 
 @source

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from ..actions.contact.tables import is_clear
 from ..core.band import (SMALL, Band, BandMatrix, Inertia, dense, factorize, fix,
                          solve_dependent)
 from ..core import Array, cached_property, handle_of, refuse
@@ -122,6 +123,10 @@ class LinearSolver:
             return
         if u is not None:
             self.assembled_at(u, t)
+        if self.at_times and is_clear(s.forces.clear, self._at[0], 0.0):
+            s.K.factorize()
+            self.keep_band()
+            return
         J = constraints.jacobian_entries(u, t)
         more = tuple(np.append(a, b) for a, b in zip(
             constraints.curvature_entries(u, t, multipliers), self._far_entries()))

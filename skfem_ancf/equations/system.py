@@ -202,11 +202,29 @@ class System:
             return self
         whole, other = self._whole or self, object.__new__(System)
         vars(other).update((name, x) for name, x in vars(whole).items()
-                           if name not in ("backend", "solver"))
+                           if name not in ("backend", "solver", "_spare"))
         other._whole, other.clock = whole, self.clock
         other.histories = whole.histories.after(history, span)
         other.forces = other.histories.forces
         return other
+
+    def lent(self, history: Array | None, span: float) -> System:
+        """:meth:`after` for an increment: what an earlier one gave back, if there is one. What that
+        knows about where nothing touches, and its tables for compiled code, stay."""
+        other = vars(self._whole or self).pop("_spare", None)
+        if other is None:
+            return self.after(history, span)
+        other.clock = self.clock
+        other.histories.put(history)
+        other.histories.span[0] = span
+        for pair in other.forces.pairs:  # what touches is searched anew
+            pair.skin[:], pair.start_at[:] = 0.0, np.nan
+        return other
+
+    def give_back(self) -> None:
+        """Leave this system to the next increment."""
+        if self._whole is not None and self.histories is not self._whole.histories:
+            vars(self._whole)["_spare"] = self
 
     def sticking(self) -> System:
         """The equations in whose tangents all points that touch an obstacle stick."""

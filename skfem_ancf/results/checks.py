@@ -168,7 +168,8 @@ def warn_of(state: Any) -> None:
     """Warn of a doubtful static solution, and of what is found beyond the range of the model."""
     if state.doubt:
         warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
-    if state.system.forces.contacts.groups:
+    contacts = state.system.forces.contacts
+    if contacts.groups and not contacts.untouched(state.u):
         for text in state._equations.forces.contacts.sunk(state.u, state.load):
             warn(text, ModelWarning)
     for text in _kinks(state):

@@ -55,7 +55,8 @@ class Options(NamedTuple):
     """Options of an iteration: method "mixed" or "newton", tolerance, largest number of iterations.
     If ``watched``, the iteration stops where the mixed method does not seem to converge. ``close``:
     the start is close to the equilibrium. ``drag`` (N,) is a force on each DOF per displacement in
-    the increment, and ``guess`` (N,) a first displacement."""
+    the increment, and ``guess`` (N,) a first displacement. ``rough`` is a larger tolerance where
+    something may touch."""
 
     route: Route
     method: str
@@ -65,6 +66,7 @@ class Options(NamedTuple):
     close: bool = False
     drag: Any = None
     guess: Any = None
+    rough: float = 0.0
 
 
 class Increment:
@@ -73,7 +75,7 @@ class Increment:
 
     def __init__(self, system: System, start: StaticResult, level: float,
                  options: Options) -> None:
-        self.system = system.after(start.memory, (level - start.load) * options.route.span)
+        self.system = system.lent(start.memory, (level - start.load) * options.route.span)
         self.start, self.level, self.options = start, level, options
         self.load, self.time = options.route.load_and_time(level)
         self.record = LoadStep(level)
@@ -115,6 +117,7 @@ class Increment:
         memory, lost = self.system.accept(start.u, found.u, self.load, self.time)
         if (drag := self.options.drag) is not None:
             lost += float(drag @ (found.u - start.u) ** 2)
+        self.system.give_back()
         return StaticResult(**vars(start) | {
             "steps": [*start.steps, self.record], "load": self.level,
             "rubbed": start.rubbed + lost, "memory": memory, "u": found.u,
@@ -183,7 +186,8 @@ class Increment:
         backend, by, drag = backend or system.backend, solver or system.solver, options.drag
         give_up = BY_THIRD if by_third else (
             BY_SECOND_OR_LATE if options.watched and not solver else NEVER)
-        rules = rules_of(system, options.method, options.tol, options.most, give_up)
+        rules = rules_of(system, options.method, options.tol, options.most, give_up,
+                         options.rough)
         tables = backend.tables
         target, factors, gap, moved = self._target(tables, u, by)
         c, g = tables.at(self.time)

@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ..actions.contact.tables import is_clear
+from ..actions.forces.kernels import nothing_touches
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
 from ..core import F1, MADE, Array, apart, call_solver, indices, source
@@ -164,7 +165,9 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
     norms = np.empty(3)
     loose = 1.0 if largest(x[DRAG]) > 0.0 else 0.0
     at_rest, last, moving, k = False, False, target.moving, 0
-    work = before = 0.0
+    work, before, tol = 0.0, 0.0, rules.tol
+    touches = e.forces.contacts.number > 0 or e.forces.changing > 0
+    clear = not touches
     while True:
         # the last residual needs no tangent
         balance(e, target, factors, AT_START if k == 0 else AT_END if last else BETWEEN,
@@ -173,12 +176,16 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if not rho < 1e300:
             return NOT_FINITE, k, k, by_band and k > 0, UNSEEN
         residuals[k] = rho / size if size > 0.0 else 0.0
+        if touches and not clear:
+            clear = nothing_touches(e.forces, u)
+        used, tol = tol, rules.tol if clear else rules.rough
         if k == 0:
-            balanced = is_at_rest(rho, size, joint_gap, rules.tol)
+            balanced = is_at_rest(rho, size, joint_gap, tol)
             # round-off, unless the correction shows that it is the load of a slender beam
             at_rest = rho <= rules.force_noise
         else:
-            balanced = last and is_balanced(rho, size, joint_gap, rules.tol, rules.force_noise)
+            balanced = last and used <= tol and is_balanced(rho, size, joint_gap, tol,
+                                                            rules.force_noise)
         if balanced and not moving:
             return CONVERGED, k + 1, k, by_band and k > 0, examine(e, u, stresses[0])
         if k == rules.iterations:
@@ -188,7 +195,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if moving:
             _move(e, target, g, moved, u, R, phi)
         if by_band:
-            if e.forces.changing > 0 and not is_clear(e.forces.clear, u, 0.0):
+            if e.forces.changing > 0 and not clear and not is_clear(e.forces.clear, u, 0.0):
                 return INDEFINITE, k + 1, k, False, UNSEEN
             if solve_definite(e.K, e.factors, e.fixed, R, du) == 0:
                 return INDEFINITE, k + 1, k, False, UNSEEN
@@ -202,8 +209,9 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             return SINGULAR, k + 1, k, False, UNSEEN
         if moving:
             add_multiple(1.0, moved, du)
-        elif e.forces.contacts.number > 0 or e.forces.changing > 0:
-            hold_back(e, target.at, loose, u, R, du, dm)
+            clear = not touches
+        elif touches:
+            clear = hold_back(e, target.at, loose, clear, u, R, du, dm) > 0
         moving = False
         add_multiple(1.0, du, u)
         add_multiple(1.0, dm, multipliers)
@@ -213,7 +221,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if rules.give_up > NEVER and diverges(rules.give_up, k - 1, works[k - 1]):
             return NOT_CONVERGED, k, k, by_band, UNSEEN
         contraction = work / before if before > 0.0 else 1.0
-        last = (k >= FEWEST or at_rest) and is_small(work, contraction, rules.tol, reference,
+        last = (k >= FEWEST or at_rest) and is_small(work, contraction, tol, reference,
                                                      rules.noise)
 
 

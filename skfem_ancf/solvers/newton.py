@@ -136,7 +136,9 @@ class Search:
 
     def __init__(self, system: System, u: Array | None, memory: Array | None, rules: Steps,
                  stable: bool, progress: bool | None, span: float = 0.0) -> None:
-        self.system = system = system.after(memory, span)
+        if memory is not None or span or system.forces.contacts.anchored:
+            system = system.after(memory, span)
+        self.system = system
         self.rules, self.stable, self.progress, self._span = rules, stable, progress, span
         contacts, clock = system.forces.contacts, system.clock
         self.stabilised_by_loads = bool(system.constraints.missing_supports)

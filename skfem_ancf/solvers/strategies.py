@@ -24,7 +24,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..actions.contact.contacts import LARGEST_FACTOR, YIELDS, Contacts
-from ..actions.contact.tables import ANCHORED, BILATERAL, stiffness_factor
+from ..actions.contact.tables import ANCHORED, BILATERAL, is_clear, stiffness_factor
+from ..actions.forces.kernels import nothing_touches
 from ..actions.forces.springs import Turns
 from ..core import NO_FACTORS, Array, handle_of
 from ..core.band import fix
@@ -313,6 +314,8 @@ TIMES, RETRIED = 4, 2
 def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
     """Flags of points near an obstacle by group; None if they are few, or already in contact."""
     flags, most, pressed = [], 0.0, 0.0
+    if is_clear(contacts.tables.clear, u, NEAR * max(group.height for _, group in contacts.groups)):
+        return None
     for (_, group), _, gap in contacts.look(u, t):
         flags.append(gap < NEAR * group.height)
         whole = group.areas.sum()
@@ -406,8 +409,7 @@ class ContactSearch:
         options = self.increment.options
         chosen = options._replace(most=min(options.most, most or options.most))
         if rough:
-            chosen = options._replace(tol=max(options.tol, CLOSE),
-                                      most=min(options.most, MOST_FROM_SOFT))
+            chosen = options._replace(rough=CLOSE, most=min(options.most, MOST_FROM_SOFT))
         if begin is None:
             return self.increment.from_start(chosen)
         return self.increment.iterate(begin, chosen)
@@ -417,7 +419,8 @@ class ContactSearch:
         # moves one point out of the obstacle does not throw off its neighbours
         with self.contacts.without_friction(soft=True):
             found = self.solve(None, True)
-        return self.solve(found, False, most)
+        forces = self.increment.system.backend.tables.plain.forces
+        return found if nothing_touches(forces, found.u) else self.solve(found, False, most)
 
     def _released(self, flags):
         """Rough, on soft obstacles, from points that are bound."""

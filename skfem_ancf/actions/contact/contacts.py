@@ -16,8 +16,9 @@ from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set
                       untouched)
 from .points import add_resistance, mean_pressure, potential, pressure_slope
 from .tables import (ANCHORED, ANCHORS, AUGMENT, BEGIN, CUSTOM, END, FORCE, HEAD, NOW, POSE, POSES,
-                     PRESSURES, RATE, SEEN as SEEN_AT, SETTLE, TANGENT, TINY, TURNS, ContactTables,
-                     Law, Pair, Request, carried, clear_table, set_clear, taken_back, transition,
+                     PRESSURES, RATE, SAFE, SEEN as SEEN_AT, SETTLE, TANGENT, TINY, TURNS,
+                     ContactTables, Law, Pair, Request, carried, clear_table, set_clear,
+                     taken_back, transition,
                      weights_of_motion)
 
 
@@ -113,7 +114,8 @@ class Contacts:
         self.put(0.0, 0.0, self.tables.poses)
         if self.tables.clear.size:
             u = np.zeros(N)
-            set_clear(self.tables.clear, u, min(gap.min() for _, _, gap in self.look(u, 0.0)))
+            set_clear(self.tables.clear, u, SAFE * min(
+                gap.min() for _, _, gap in self.look(u, 0.0)))
 
     def _pair(self, k, group, poses, varies, handle):
         """The :class:`~skfem_ancf.actions.contact.tables.Pair` of a group, without history."""
@@ -140,14 +142,13 @@ class Contacts:
 
     def _clear(self, N):
         """The table of :func:`~skfem_ancf.actions.contact.tables.is_clear`."""
-        out = np.zeros(N)
+        out = np.zeros((2, N // 2))
         for _, group in self.groups:
-            a = np.abs(group.weights)
+            a, pairs = np.abs(group.weights), np.arange(len(group.weights))
             if len(group.slopes):
                 a = a + 2.0 * np.abs(group.slopes * group.offsets) / np.hypot(*group.starts[2:])
-            pairs = np.sqrt(2.0) * weights_of_motion(
-                a.T, group.first[:, None] // 2 + np.arange(len(a)), -(-N // 2))
-            out = np.maximum(out, np.repeat(pairs, 2)[:N])
+            out = np.maximum(out, weights_of_motion(
+                a.T, group.first[:, None] // 2 + pairs, N // 2, pairs % (len(a) // 2) == 0))
         return clear_table(out, BEYOND * max(group.law.radius for _, group in self.groups))
 
     def numbers(self, k: int) -> Array:

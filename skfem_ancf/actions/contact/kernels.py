@@ -22,8 +22,8 @@ from .points import (RESPONSE, TOUCH, Touch, add_bend, add_coupling, add_resista
                      cross, dot, mean_pressure, pressure_slope, product, put, respond,
                      return_mapping, scaled, spread, turned, vector)
 from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, DAMPED_TANGENT, END,
-                     FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SETTLE, TINY, ContactTables,
-                     Request, stiffness_factor, is_clear, pair_of, set_clear, transition)
+                     FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SAFE, SETTLE, TINY, ContactTables,
+                     Request, is_clear, pair_of, set_clear, stiffness_factor, transition)
 
 #: Largest distance at which anchors follow points in a motion, in radii of an element.
 BEYOND = 4.0
@@ -61,7 +61,7 @@ def of_contacts(tables, request, u, v, out):
     for k in range(n):
         of_pair(pair_of(tables, k), request, u, v, out, least[k:k + 1])
     if request.what == FORCE and tables.clear.size > 0:
-        set_clear(tables.clear, end, smallest(least))
+        set_clear(tables.clear, end, SAFE * smallest(least))
 
 
 @source

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core import (C1, C2, C3, F1, F2, I1, I2, MADE, apart, everywhere, indices, primitive,
                      source, where)
-from ...core.band import copy, dot as inner, largest, smallest
+from ...core.band import copy, dot as inner, farthest, largest, smallest
 from ...core.callbacks import SEARCHES, call_custom, owner
 from ..tables import least_each
 from .points import (Touch, add_bend, add_coupling, add_resistance, by_slope, cross, dot,
@@ -99,7 +99,7 @@ class PairTables(NamedTuple):
     handle: int  # of the search
     found: I1  # address of the Candidates
     seen: C1  # displacements at the last search, (n,)
-    moves: F1  # how far a point moves for each, at most
+    moves: F2  # their weights, see :func:`~skfem_ancf.actions.contact.tables.weights_of_motion`
     skin: F1  # the candidates are complete until points or facets have moved by half of it, (1,)
     start: Facing  # at the start of the last step, with the displacements there
     start_at: C1
@@ -191,13 +191,10 @@ def look(t, z, found):
         outer = scaled(side / size(T), turned(T))
         normal[p], x[p] = outer, r + scaled(t.offsets[t.of[p]], outer)
         found.e[p], found.zeta[p], found.gap[p] = -1, 0.0, 0.0
-    moved = np.empty(z.size)
-    for k in indices(z.size):
-        moved[k] = t.moves[k] * size(z[k] - t.seen[k])
-    travel = largest(moved)
+    u, none = z.view(np.float64), t.sides[:0]
+    travel = farthest(t.moves, u, t.seen.view(np.float64))
     if not travel < 0.5 * t.skin[0]:
-        none = t.moves[:0]
-        call_custom(SEARCHES, t.handle, np.int64(0), 0.0, 0.0, z.view(np.float64), none, none)
+        call_custom(SEARCHES, t.handle, np.int64(0), 0.0, 0.0, u, none, none)
         travel = 0.0
     known = candidates_of(t)
     far = np.empty(known.p.size)

@@ -7,8 +7,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...core import C1, F1, F2, I1, I2, Array, indices, primitive, source
-from ...core.band import largest
+from ...core import C1, F1, F2, I1, I2, Array, indices, primitive, shaped, source
+from ...core.band import farthest
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)
@@ -115,43 +115,57 @@ def pair_of(tables, k):
 
 
 #: How far points may move from displacements at which nothing touches; 1 if the tangent of the last
-#: step has entries of contact; how far anchors of friction follow points; from SEEN on the
-#: displacements (N,), then weights (N,): a point moves by no more than the largest weighted change.
-MARGIN, HAS_ENTRIES, FOLLOWED, SEEN = range(4)
-#: Part of a gap that is the margin: two surfaces may approach each other.
-SAFE = 0.4
+#: step has entries of contact; how far anchors of friction follow points; number of steps on whose
+#: way something may touch; from SEEN on the displacements (N,), then weights of pairs of DOFs
+#: (2, N / 2), see :func:`weights_of_motion`.
+MARGIN, HAS_ENTRIES, FOLLOWED, PASSED, SEEN = range(5)
+#: Part of a gap that is the margin; half of it if two surfaces may approach each other.
+SAFE = 0.9
 
 
 @source
 def is_clear(clear, u, less):
     """True if nothing can touch at u (N,), with a margin that is smaller by ``less``."""
-    n = u.size
-    if clear.size == 0 or not clear[MARGIN] > less:
-        return False
-    moved, seen, weights = np.empty(n), clear[SEEN:SEEN + n], clear[SEEN + n:]
-    for i in indices(n):
-        moved[i] = weights[i] * (u[i] - seen[i])
-    return largest(moved) < clear[MARGIN] - less
+    return clear.size > 0 and clear[MARGIN] > 0.0 and motion(clear, u) < clear[MARGIN] - less
 
 
 @source
-def set_clear(clear, u, gap):
-    """Note that the least gap at u is ``gap``."""
-    clear[MARGIN], seen = SAFE * gap, clear[SEEN:SEEN + u.size]
+def motion(clear, u):
+    """How far points have moved to u (N,) since surfaces were looked at, at most."""
+    n = u.size
+    return farthest(shaped(clear[SEEN + n:], (2, n // 2)), u, clear[SEEN:SEEN + n])
+
+
+@source
+def left_of(clear, u):
+    """What is left of the margin at u (N,)."""
+    return clear[MARGIN] - motion(clear, u) if clear.size > 0 else 0.0
+
+
+@source
+def set_clear(clear, u, margin):
+    """Note how far points may move from u."""
+    clear[MARGIN], seen = margin, clear[SEEN:SEEN + u.size]
     for i in indices(u.size):
         seen[i] = u[i]
 
 
 def clear_table(weights: np.ndarray, followed: float = 0.0) -> np.ndarray:
     """A table without a margin."""
-    return np.concatenate([[0.0, 0.0, followed], 0.0 * weights, weights])
+    return np.concatenate([[0.0, 0.0, followed, 0.0], 0.0 * weights.ravel(), weights.ravel()])
 
 
-def weights_of_motion(weights: np.ndarray, dofs: np.ndarray, n: int) -> np.ndarray:
-    """Weights (n,) of pairs of DOFs from those in the motion of points, (P, B) each."""
-    largest = np.zeros(n)
-    np.maximum.at(largest, dofs, weights)
-    return largest * np.max(np.sum(weights / np.maximum(largest[dofs], TINY), axis=1))
+def weights_of_motion(weights: np.ndarray, dofs: np.ndarray, n: int,
+                      places: np.ndarray) -> np.ndarray:
+    """Weights (2, n) of pairs of DOFs, of places and of others, from those in the motion of points,
+    (P, B) each: a point moves by no more than the largest weighted change of places plus that of
+    others."""
+    # Places together are a translation, of which this is the exact motion.
+    out = np.zeros((2, n))
+    for largest, own in zip(out, (weights * places, weights * ~places)):
+        np.maximum.at(largest, dofs, own)
+        largest *= np.max(np.sum(own / np.maximum(largest[dofs], TINY), axis=1))
+    return out
 
 
 @source

@@ -15,9 +15,9 @@ from ...core import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_each, add_products
 from ..contact.kernels import FAR, of_contacts, untouched
 from ..contact.pairs import pair_accept, pair_force, pair_tables
-from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SETTLE,
-                              TANGENT, TURNS, ContactTables, Request, RESISTING as RUBBING,
-                              is_clear, set_clear)
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, PASSED, RATE,
+                              SAFE, SETTLE, TANGENT, TURNS, ContactTables, Request,
+                              RESISTING as RUBBING, is_clear, left_of, set_clear)
 
 #: Kinds of elements.
 KINDS = 4
@@ -174,7 +174,7 @@ def _add_pairs(tables, span, u0, u1, f):
         pair_force(pair, _used(pair, u0), _used(pair, u1), span == 0.0, out, found)
         least = min(least, found[0])
         add_each(total, pair.used, out)
-    set_clear(tables.clear, u1, least)
+    set_clear(tables.clear, u1, 0.5 * SAFE * least)
 
 
 @source
@@ -232,6 +232,28 @@ def nothing_touches(tables, u):
     """True if it is known that no obstacle touches at u, and that changing elements do nothing."""
     return (tables.contacts.number == 0 or untouched(tables.contacts, FORCE, u)) and (
         tables.changing == 0 or is_clear(tables.clear, u, 0.0))
+
+
+@source
+def count_passed(tables, u0, u1):
+    """Count a step on whose way something may touch."""
+    if not (nothing_touches(tables, u0) and nothing_touches(tables, u1)):
+        tables.clear[PASSED] += 1.0
+
+
+@source
+def way_is_clear(tables, t, u, du, f):
+    """True if it is known that nothing touches on the way from u, where nothing does, along du; f
+    is workspace."""
+    ahead = u + du
+    if nothing_touches(tables, ahead):
+        return True
+    # what is left at u, and what is found ahead, are balls around points that have to meet
+    by_obstacles, by_members = left_of(tables.contacts.clear, u), left_of(tables.clear, u)
+    contact_work(tables, t, ahead, du, f)
+    return nothing_touches(tables, ahead) and (
+        tables.contacts.number == 0 or is_clear(tables.contacts.clear, u, -by_obstacles)) and (
+        tables.changing == 0 or is_clear(tables.clear, u, -by_members))
 
 
 @source

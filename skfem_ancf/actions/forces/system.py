@@ -11,7 +11,7 @@ from scipy import sparse
 
 from ...core import Array, constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
-from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
+from ..contact.tables import HAS_ENTRIES, SAFE, SEEN, clear_table, is_clear, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
 from .springs import RotatingFrame, TorsionalSpring
@@ -96,14 +96,15 @@ class Forces:
         self.rows, self.size = row, at
         if blocks:
             self._couple(blocks, places)
-        weights = np.zeros(N)
+        weights = np.zeros((2, N // 2))
         for element, dofs in self.changing:
             if hasattr(element, "least_gap"):
-                weights[dofs] = np.maximum(weights[dofs], element.weights)
+                at = dofs[::2] // 2
+                weights[:, at] = np.maximum(weights[:, at], element.weights)
         self._pair()
         self.clear, u = clear_table(weights), np.zeros(N)
         if self.changing:
-            set_clear(self.clear, u, self._least_gap(u))
+            set_clear(self.clear, u, 0.5 * SAFE * self._least_gap(u))
         self.distant = bool(self._in_border.any())
         self.couples_far = self.distant or bool(self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
@@ -251,7 +252,7 @@ class Forces:
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.custom, self._slices)) + (
-            0.0 if is_clear(self.clear, u, 0.0) else sum(
+            0.0 if self._at_rest(u) else sum(
                 element.potential_at(u[at].reshape(-1, 2), t) or 0.0
                 for element, at in self._paired))
 
@@ -308,7 +309,7 @@ class Forces:
 
     def _at_work(self, *displacements):
         """The elements with a memory, without changing ones that do nothing at displacements."""
-        idle = all(is_clear(self.clear, u, 0.0) for u in displacements)
+        idle = self._at_rest(*displacements)
         return [item for item in self.remembering if not (idle and item.changing)]
 
     def take_over(self, other: Forces, u: Array, t: float) -> bool:
@@ -351,12 +352,16 @@ class Forces:
 
     # elements with a pattern that changes
 
+    def _at_rest(self, *displacements: Array) -> bool:
+        """True if it is known that they do nothing at displacements (N,)."""
+        return all(is_clear(self.clear, u, 0.0) for u in displacements)
+
     def changing_entries(self, t: float, u0: Array, u1: Array, v: Array | None = None,
                          factor: float = 0.0) -> tuple[Array, Array, Array]:
         """Rows, columns and values (k,) of the stiffness of changing elements, of the mean force
         between two displacements if these are two arrays. Plus a factor times the resistance."""
         found: list[Any] = [(NONE, NONE, np.zeros(0))]
-        if is_clear(self.clear, u0, 0.0) and is_clear(self.clear, u1, 0.0):
+        if self._at_rest(u0, u1):
             return found[0]
         # a line search, and products, ask at the displacements of the last factors
         by = np.concatenate([u0, u1, [t, factor, u0 is u1], [] if v is None else v, *(
@@ -383,7 +388,7 @@ class Forces:
         """Why a step must not lead from a displacement and time to others, or None."""
         if text := self.contacts.passed(a, b):
             return text
-        if not self.changing or all(is_clear(self.clear, u, 0.0) for u, _ in (a, b)):
+        if not self.changing or self._at_rest(a[0], b[0]):
             return None
         for element, at in self.changing:
             if text := element.passed(*(u[at].reshape(-1, 2) for u in (a[0], b[0])), b[1]):
@@ -392,7 +397,8 @@ class Forces:
 
     def moves_far(self, u: Array) -> Array:
         """True for steps between displacements (n + 1, N) that may lead through an element."""
-        moved = np.max(np.abs(np.diff(u, axis=0)) * self.clear[SEEN + self._N:], axis=1)
+        weights = self.clear[SEEN + self._N:].reshape(2, 1, -1)
+        moved = np.max(weights * np.abs(np.diff(u, axis=0).view(complex)), axis=2).sum(axis=0)
         return moved >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 
     def looks(self, u: Array, t: float, start: Array | None) -> Iterator[tuple[Any, Any]]:

@@ -127,9 +127,12 @@ class BodyContact(ForceElement):
             raise InputError(f"{self!r} has no beam, whose modulus would give a stiffness: give "
                              "stiffness=, a pressure per penetration")
         solids = [(k, _inside(layout.members[k], origin)) for k in used if k not in beams]
-        self.broad_search = Search(surfaces, allowed, solids, (self.penalty, WIDTH, self.friction))
+        places = np.isin(self.dofs, np.concatenate([layout.offset(k) // 2 + np.flatnonzero(
+            layout.members[k].rigid_motions()[::2, 0]) for k in used]))
+        self.broad_search = Search(surfaces, allowed, solids,
+                                   (self.penalty, WIDTH, self.friction), places)
         self._surfaces, self.origin = surfaces, origin
-        self.weights = np.repeat(np.sqrt(2.0) * self.broad_search.weights, 2)
+        self.weights = self.broad_search.weights
         self.near = NEAR * self.broad_search.height
         self._begin(layout)
         return [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in self.dofs]

@@ -81,12 +81,13 @@ class Search:
     """
 
     def __init__(self, surfaces: Surfaces, allowed: Array, solids: Sequence[Any],
-                 numbers: tuple[float | None, float, float]) -> None:
+                 numbers: tuple[float | None, float, float], places: Array) -> None:
         self.surfaces, self.allowed = surfaces, allowed
         f, ((N, _), (D, slope)) = surfaces.facets, surfaces.points
         n = int(f.dofs.max()) + 1
         self.weights = BETWEEN * weights_of_motion(
-            np.abs(N) + 2.0 * np.abs(surfaces.shift / slope)[:, None] * np.abs(D), surfaces.dofs, n)
+            np.abs(N) + 2.0 * np.abs(surfaces.shift / slope)[:, None] * np.abs(D), surfaces.dofs, n,
+            places[surfaces.dofs])
         self.height = h = float(np.min(f.heights))
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
         self._seed_zeta = (2.0 * np.arange(m) + 1.0) / m - 1.0
@@ -114,7 +115,7 @@ class Search:
 
     def fresh(self, other: bool = True) -> Search:
         """Forget what was found, or make a copy that has found nothing."""
-        one, t, n = copy(self) if other else self, self.tables, len(self.weights)
+        one, t, n = copy(self) if other else self, self.tables, len(self.tables.seen)
         one.tables = t._replace(
             handle=handle_of(one), found=np.zeros(1, np.int64), seen=np.zeros(n, complex),
             skin=np.zeros(1), start=facing(t.starts.shape[0], t.starts.shape[1], len(t.of)),
