@@ -208,9 +208,9 @@ class System:
         other.forces = other.histories.forces
         return other
 
-    def lent(self, history: Array | None, span: float) -> System:
-        """:meth:`after` for an increment: what an earlier one gave back, if there is one. What that
-        knows about where nothing touches, and its tables for compiled code, stay."""
+    def recycled(self, history: Array | None, span: float) -> System:
+        """:meth:`after` for an increment, in the arrays of an earlier one if there was one: its
+        tables for compiled code, and what it knows about where nothing touches, stay."""
         other = vars(self._whole or self).pop("_spare", None)
         if other is None:
             return self.after(history, span)
@@ -221,8 +221,8 @@ class System:
             pair.skin[:], pair.start_at[:] = 0.0, np.nan
         return other
 
-    def give_back(self) -> None:
-        """Leave this system to the next increment."""
+    def recycle(self) -> None:
+        """Leave the arrays of this increment to the next one."""
         if self._whole is not None and self.histories is not self._whole.histories:
             vars(self._whole)["_spare"] = self
 

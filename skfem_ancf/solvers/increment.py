@@ -75,7 +75,7 @@ class Increment:
 
     def __init__(self, system: System, start: StaticResult, level: float,
                  options: Options) -> None:
-        self.system = system.lent(start.memory, (level - start.load) * options.route.span)
+        self.system = system.recycled(start.memory, (level - start.load) * options.route.span)
         self.start, self.level, self.options = start, level, options
         self.load, self.time = options.route.load_and_time(level)
         self.record = LoadStep(level)
@@ -117,7 +117,7 @@ class Increment:
         memory, lost = self.system.accept(start.u, found.u, self.load, self.time)
         if (drag := self.options.drag) is not None:
             lost += float(drag @ (found.u - start.u) ** 2)
-        self.system.give_back()
+        self.system.recycle()
         return StaticResult(**vars(start) | {
             "steps": [*start.steps, self.record], "load": self.level,
             "rubbed": start.rubbed + lost, "memory": memory, "u": found.u,
