@@ -343,7 +343,10 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
                      progress=False, span=t - last.t)
     bounded = (system.forces.contacts.obstacles or system.forces.changing
                or system.constraints.missing_supports)
-    for method in ("mixed", "descent" if bounded else "newton", *(("all",) if smallest else ())):
+    # what yields is followed by smaller increments: a descent of its forces leads nowhere
+    second = ("newton",) if not bounded else () if system.histories.of_beams.history.size else (
+        "descent",)
+    for method in ("mixed", *second, *(("all",) if smallest else ())):
         try:
             if method == "all":
                 logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
@@ -372,16 +375,16 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
 def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticResult,
            options: Options, smallest: bool) -> Instant:
     """The equilibrium at t of loose members that may touch, with the drag of :func:`drag_of`."""
-    # From a guess by the last change, then from the last equilibrium: there nothing that the lid
-    # presses moves yet, and contacts open and close in turn for longer. The smallest increment is
-    # tried with more drag, with which bodies snap through in several increments.
+    # From a guess by the last change: from the last equilibrium, where nothing that the lid presses
+    # moves yet, contacts open and close in turn for longer. What fails is a body that snaps
+    # through: with more drag it does so in several increments.
     dt, u = t - last.t, last.result.u
     start.memory = system.histories.after(start.memory).relaxed(u)
     options = options._replace(most=max(options.most, LOOSE))
-    tries: list[Any] = [] if last.velocity is None else [
-        options._replace(drag=drag, guess=u + dt * last.velocity)]
-    tries += [options._replace(drag=factor * drag, method="newton")
-              for factor in (1.0, *(MORE_DRAG if smallest else ()))]
+    guess = None if last.velocity is None else u + dt * last.velocity
+    tries = [options._replace(drag=drag, guess=guess)] + [
+        options._replace(drag=factor * drag, method="newton")
+        for factor in (MORE_DRAG if smallest else MORE_DRAG[:1])]
     for k, one in enumerate(tries):
         step = Increment(system, start, 1.0, one)
         try:
