@@ -268,7 +268,7 @@ class BandMatrix(Band):
         n, w, stored = self.n, self.width, self.flat.reshape(-1, self.ld).T
         if self.symmetric:
             lower, stored = stored, np.zeros((2 * w + 1, n))
-            for k in range(w + 1):
+            for k in range(min(w + 1, n)):
                 stored[w - k, k:] = stored[w + k, :n - k] = lower[k, :n - k]
         else:
             stored = stored[self.top - w:]

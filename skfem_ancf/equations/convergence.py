@@ -111,7 +111,7 @@ def rules_of(system: Any, method: str, tol: float, most: int, give_up: int = NEV
     larger tolerance where something may touch."""
     scales = system.scales
     # the residual has the round-off of all DOFs, the work that of the strains
-    return Rules(method == "mixed", most, tol, max(tol, rough), 8.0 * scales.work_noise,
+    return Rules(method == "mixed", most, tol, rough or tol, 8.0 * scales.work_noise,
                  8.0 * scales.force_noise, give_up)
 
 

@@ -211,6 +211,8 @@ class System:
     def recycled(self, history: Array | None, span: float) -> System:
         """:meth:`after` for an increment, in the arrays of an earlier one if there was one: its
         tables for compiled code, and what it knows about where nothing touches, stay."""
+        if not self.histories.values.size:
+            return self
         other = vars(self._whole or self).pop("_spare", None)
         if other is None:
             return self.after(history, span)
