@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skfem import Basis, ElementVector
 
 from skfem_ancf import ElementBeamANCF, InputError, MeshBeam, MeshError, NameUnknown
-from skfem_ancf.elements.base import POINT_FAMILIES
+from skfem_ancf.elements.ancf import POINT_FAMILIES
 from skfem_ancf.mesh.mapping import SECTIONS
 
 ORDERS = range(1, 11)

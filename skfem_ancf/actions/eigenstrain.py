@@ -23,7 +23,7 @@ from ..formulations import COMPONENTS
 from ..sections import Layer
 from .item import Item, takes
 from .loads import Amplitude, Load
-from .places import Symbol, middle
+from .symbols import Symbol, middle
 
 # eigenstrains of nonlinear laws
 

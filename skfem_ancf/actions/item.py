@@ -118,7 +118,7 @@ class Item(Immutable, Bound):
         return out
 
     def symbols(self, layout: Layout) -> Iterable[Any]:
-        """What a picture shows of it: a list of :class:`skfem_ancf.actions.places.Symbol`, with
+        """What a picture shows of it: a list of :class:`skfem_ancf.actions.symbols.Symbol`, with
         its beam by number; nothing by default.
 
         Examples
@@ -127,7 +127,7 @@ class Item(Immutable, Bound):
 
         >>> from skfem_ancf import Beam, ElementBeamCable, Item, MeshBeam, Scene, StVenantKirchhoff
         >>> from skfem_ancf.actions.places import point
-        >>> from skfem_ancf.actions.places import Symbol
+        >>> from skfem_ancf.actions.symbols import Symbol
         >>> class Magnet(Item):
         ...     def energy(self, u, t):
         ...         return 1e-3 * u[-4]**2

@@ -14,7 +14,8 @@ from ..core import (Array, ArrayLike, TimeFunction, ask, refuse, require_directi
                     require_finite_scalar, require_positive)
 from ..mesh.places import as_point
 from .item import Item
-from .places import Symbol, dense_entries, force_symbol, inside, point, section
+from .places import dense_entries, point, section
+from .symbols import Symbol, force_symbol, inside
 from .loads import DeadLoad, Load, TimedLoad, number_at
 
 # a dead force on a point of a cable beside its axis: a force on the axis and a couple

@@ -12,7 +12,7 @@ from ..beam.kinematics import plane
 from ..core import Place, SupportError, refuse, require_finite_scalar, require_option, shown
 from ..mesh.places import is_point, node_of
 from .item import Item
-from .places import Symbol, supports_of
+from .symbols import Symbol, supports_of
 from .joints.weld import Hinge, PlaneSection, PrescribedDisplacement
 
 

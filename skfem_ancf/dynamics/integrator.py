@@ -20,7 +20,8 @@ from ..core import (I1, Array, ConvergenceError, SupportError, handle_of, hints,
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate
-from .schemes import Collocation, EnergyMomentum
+from .schemes import EnergyMomentum
+from .collocation import Collocation
 from .time_functions import SAMPLES, TimeFunctions, rates
 from .records import (FAILURES, Dampers, Interval, JointMotion, JointMotions, LowRankRows,
                       Matrices, Multipliers, Rule, StageWork, StepData, StepState, Vectors, Work,

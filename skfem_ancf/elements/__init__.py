@@ -1,8 +1,8 @@
 """Beam elements. A new element is one file and one line here."""
 
-from .base import (ORDER_OF_FIELD, ElementBeam, ElementBeamANCF, ElementBeamANCFCubic,
-                   ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
-                   choose_element)
+from .ancf import (ORDER_OF_FIELD, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
+                   ElementBeamCable, ElementBeamPatelShabana, choose_element)
+from .base import ElementBeam
 
 #: Elements by name.
 ELEMENTS = {

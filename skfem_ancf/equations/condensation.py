@@ -19,7 +19,7 @@ from ..actions.joints.nodes import Nodes, chain_ends
 from ..beam import Beam
 from ..core.band import SMALL, BandMatrix, Inertia
 from ..core import Array
-from .mobility import diagonal_factors
+from .rank import diagonal_factors
 
 logger = logging.getLogger(__name__)
 

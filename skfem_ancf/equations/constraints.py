@@ -16,8 +16,8 @@ from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam import Beam, RigidBody
 from ..core.band import dense
 from ..core import Array, InputError, ModelWarning, SupportError, cached_property, is_builtin, shown
-from .mobility import (DENSE, FREE, advice, first_dependent, first_of, free_rigid_motions, repeated,
-                       shared, who)
+from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
+from .rank import DENSE, FREE, first_dependent
 
 #: Largest number of multipliers with dense Jacobians.
 FEW = 96

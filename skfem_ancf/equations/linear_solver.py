@@ -20,7 +20,7 @@ from ..core.band import (SMALL, Band, BandMatrix, Inertia, dense, factorize, fix
                          solve_dependent)
 from ..core import Array, cached_property, handle_of, refuse
 from .condensation import Condensed, CondensedMass
-from .mobility import DEPENDENT, Block, blocks, determinant_sign, diagonal_factors, inertia_of
+from .rank import DEPENDENT, Block, blocks, determinant_sign, diagonal_factors, inertia_of
 
 logger = logging.getLogger(__name__)
 

@@ -13,7 +13,8 @@ import numpy as np
 from ..actions.loads import LineLoad, Load, TimedLoad
 from ..actions.obstacles.contact import may_touch
 from ..actions.obstacles.shapes import AROUND, around, outlines
-from ..actions.places import LOADS, Symbol, Vector
+from ..actions.places import Vector
+from ..actions.symbols import LOADS, Symbol
 from ..beam import Layout
 from ..core import (AncfError, Array, refuse, require_finite_scalar, require_flag, require_positive,
                     require_unmasked, retold)

@@ -3,7 +3,8 @@
 from ..places import point, section
 from .base import ForceElement
 from .control import Control
-from .springs import Drag, Foundation, PointMass, RotatingFrame, Spring, TorsionalSpring
+from .springs import Drag, Foundation, Spring, TorsionalSpring
+from .inertia import PointMass, RotatingFrame
 
 __all__ = ["Control", "Drag", "ForceElement", "Foundation", "PointMass", "RotatingFrame", "Spring",
            "TorsionalSpring", "point", "section"]

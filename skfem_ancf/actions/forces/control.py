@@ -12,7 +12,8 @@ from ...beam.kernels.moments import mean_turning
 from ...core import (Array, InputError, ask_array, ask_number, refuse, require_function,
                      require_option, require_positive, shown)
 from ...mesh.places import is_point
-from ..places import GROUND, Symbol, Vector, is_ground, named_place, point, section
+from ..places import GROUND, Vector, is_ground, named_place, point, section
+from ..symbols import Symbol
 from ..bound import differences
 from .base import ForceElement
 from .kernels import turned

@@ -14,7 +14,8 @@ from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SAFE, SEEN, clear_table, is_clear, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
-from .springs import RotatingFrame, TorsionalSpring
+from .springs import TorsionalSpring
+from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
                       RESISTING, SETTLED, TORSION, TURNED, ForceTables, element_stiffness, kinds_of,
                       of_kinds, potential, vectors_of)

@@ -14,7 +14,8 @@ from ...beam import Beam, Layout
 from ...beam.kinematics import direction
 from ...core import Array, MeshError, sample
 from ...mesh.frame_graph import FrameGraph
-from ..places import Symbol, Vector, support
+from ..places import Vector
+from ..symbols import Symbol, support
 from .base import Joint
 
 # prescribed displacements and rotations of the nodes of a frame

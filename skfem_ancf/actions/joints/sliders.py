@@ -13,7 +13,8 @@ from ...core import (Array, ArrayLike, InputError, array_cache, hermite_basis, r
                      require_direction, require_finite, require_flag, require_label,
                      require_positive, shown)
 from ...mesh.mapping import cross, turned
-from ..places import GROUND, Symbol, Vector, is_ground, named_place, point, section, tangent_at
+from ..places import GROUND, Vector, is_ground, named_place, point, section
+from ..symbols import Symbol, tangent_at
 from .base import ComposedJoint, Equation, Joint, aligned, angle_to, distant, rotation
 
 

@@ -19,8 +19,8 @@ from ...core import (Array, ArrayLike, InputError, MeshError, Place, TimeFunctio
 from ...mesh.places import facets_of, is_point, node_of
 from ..item import Item
 from ..loads import EndMoment
-from ..places import (Symbol, Vector, both_of, boundary_of, each, is_ground, point, section,
-                      several, support_of, supports_of)
+from ..places import Vector, both_of, each, is_ground, point, section, several
+from ..symbols import Symbol, boundary_of, support_of, supports_of
 from .base import ComposedJoint, Equation, Joint, aligned, angle_to, equations_of, rotation
 
 # hinge between two or more beams
