@@ -694,7 +694,7 @@ def squeezed(n, friction, fine=False):
 def wires(quick, out):
     """Wavy wires that nothing holds, squeezed in a box until half of its height is left."""
     for n, friction in ((2, 0.0),) if quick else (
-            (3, 0.0), (3, 0.2), (6, 0.0), (6, 0.2), (20, 0.0)):
+            (3, 0.0), (3, 0.2), (6, 0.0), (6, 0.2), (20, 0.0), (20, 0.2)):
         _, deepest, (_, _, floor, lid) = squeezed(n, friction, n == 20)
         case = f"{n} wires, friction {friction}"
         yield Row("wires", case, "penetration over height", deepest, 1e-2)
