@@ -30,7 +30,7 @@ class Histories:
     increment. ``values`` has the parts ``of_forces`` (obstacles and springs), ``of_beams``, a
     :class:`Past`, and items with a memory; ``span`` (1,) is the time since, for laws with rates.
     ``lasting`` is 1 if steps change it, 3 if that of materials, else 0; ``dissipates`` if energy
-    may be lost, ``evolve`` if a material or item has a history.
+    may be lost, ``evolve`` if a material or item has a history, ``path_dependent`` if a material.
     """
 
     def __init__(self, forces: Forces, beams: Sequence[Beam], slices: Sequence[slice]) -> None:
@@ -44,6 +44,7 @@ class Histories:
             key: slice(a, b) for key, a, b in zip(keys, ends, ends[1:])}
         self._end = ends[len(some)]
         self.rest = np.concatenate([np.zeros(self._end), *(item.start for item in items)])
+        self.path_dependent = bool(some)
         self.evolve = bool(some) or any(item.element.evolves for item in items)
         lasting = forces.contacts.tables.lasting
         self.lasting = int(lasting > 0 or bool(some or items)) + 2 * bool(some)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from ..actions.bound import BoundConstraint, BoundForce, MemberForce
+from ..actions.contact.pairs import search_anew
 from ..actions.forces.kernels import add_resisting_force
 from ..actions.forces.system import Forces
 from ..actions.joints.base import UnitDirector
@@ -219,8 +220,7 @@ class System:
         other.clock = self.clock
         other.histories.put(history)
         other.histories.span[0] = span
-        for pair in other.forces.pairs:  # what touches is searched anew
-            pair.skin[:], pair.start_at[:] = 0.0, np.nan
+        search_anew(other.forces.pairs)
         return other
 
     def recycle(self) -> None:

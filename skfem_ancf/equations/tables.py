@@ -115,7 +115,7 @@ class Tables:
         self.turns = any(joint.turning for joint in system.constraints.joints)
         joints, histories = self._joints(), system.histories
         body = body_of(system.beams, system.slices, joined=not system.viscous)
-        if histories.of_beams.history.size:
+        if histories.path_dependent:
             body = body.after(histories.of_beams)
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K,
@@ -174,7 +174,7 @@ class Tables:
         tables = self.with_equations(plain)
         tables._system = ref(system)
         body, loads, elements = plain.body, plain.loads, list[Any]()
-        if histories.of_beams.history.size:
+        if histories.path_dependent:
             body = body.after(histories.of_beams)
             if self._loads[3]:  # the beams with eigenstrains, with their histories
                 those: Any = loads.eigenstrained

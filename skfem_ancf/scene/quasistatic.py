@@ -343,10 +343,10 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
                      progress=False, span=t - last.t)
     bounded = (system.forces.contacts.obstacles or system.forces.changing
                or system.constraints.missing_supports)
-    # what yields is followed by smaller increments: a descent of its forces leads nowhere
-    second = ("newton",) if not bounded else () if system.histories.of_beams.history.size else (
-        "descent",)
-    for method in ("mixed", *second, *(("all",) if smallest else ())):
+    methods = ["mixed", "descent" if bounded else "newton", *(("all",) if smallest else ())]
+    if system.histories.path_dependent:  # what yields needs smaller increments: descents fail
+        methods = [method for method in methods if method != "descent"]
+    for method in methods:
         try:
             if method == "all":
                 logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)

@@ -157,8 +157,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                 last = abs(point.load) >= limit
                 if last:
                     point = _land(tracer, start, point, float(np.copysign(limit, point.load)))
-                found = (_critical_points(tracer, start, point, locate) if locate and straight else
-                         [])
+                found = _criticals(tracer, start, point, locate) if locate and straight else []
             except (LoadStepFailed, ConvergenceError) as failure:  # that of a law
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
@@ -373,7 +372,7 @@ def _land(tracer, start, point, load):
     return tracer.set_tangent(landed, start)
 
 
-def _critical_points(tracer, p, q, tol):
+def _criticals(tracer, p, q, tol):
     """The critical points between two points with tangents, in order: kind, Point, change."""
     out, stack = [], [(p, q, 0)]
     while stack:

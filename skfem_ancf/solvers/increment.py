@@ -153,13 +153,14 @@ class Increment:
         which is close to the final one. A correction that turns a beam far strains it temporarily,
         possibly beyond the range of a nonlinear law. Of laws with a history it is far beyond yield:
         there Hooke's law comes first, except in the increments of a run, which are small."""
-        system, start, failure = self.system, self.start, None
-        remembers = system.histories.of_beams.history.size > 0
-        backend = None if start.diverging or (remembers and system.clock is not None) else (
-            system.backend.elastic_from(start.u) if remembers else system.backend.linearised)
-        if backend is None:
+        system, start, failure, backend = self.system, self.start, None, None
+        if not system.histories.path_dependent:
+            backend = system.backend.linearised
+        elif system.clock is None:
+            backend = system.backend.elastic_from(start.u)
+        if start.diverging or backend is None:
             return self.iterate(options=options)
-        if not remembers:
+        if not system.histories.path_dependent:
             try:
                 return self.iterate(options=options, by_third=True)
             except LoadStepFailed as failed:

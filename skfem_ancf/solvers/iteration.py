@@ -162,12 +162,9 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
     u, du, force, load, R, moved = x[U], x[DU], x[FORCE], x[LOAD], x[RESIDUAL], x[MOVED]
     multipliers, phi, dm = m[0], m[1], m[2]
     by_band = target.definite and e.factors.flat.size > 0
-    norms = np.empty(3)
-    loose = 1.0 if largest(x[DRAG]) > 0.0 else 0.0
-    at_rest, last, moving, k = False, False, target.moving, 0
+    norms, loose = np.empty(3), 1.0 if largest(x[DRAG]) > 0.0 else 0.0
+    at_rest, last, clear, moving, k = False, False, False, target.moving, 0
     work, before, tol = 0.0, 0.0, rules.tol
-    touches = e.forces.contacts.number > 0 or e.forces.changing > 0
-    clear = not touches
     while True:
         # the last residual needs no tangent
         balance(e, target, factors, AT_START if k == 0 else AT_END if last else BETWEEN,
@@ -176,8 +173,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if not rho < 1e300:
             return NOT_FINITE, k, k, by_band and k > 0, UNSEEN
         residuals[k] = rho / size if size > 0.0 else 0.0
-        if touches and not clear:
-            clear = nothing_touches(e.forces, u)
+        clear = clear or nothing_touches(e.forces, u)
         used, tol = tol, rules.tol if clear else rules.rough
         if k == 0:
             balanced = is_at_rest(rho, size, joint_gap, tol)
@@ -209,8 +205,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             return SINGULAR, k + 1, k, False, UNSEEN
         if moving:
             add_multiple(1.0, moved, du)
-            clear = not touches
-        elif touches:
+            clear = False
+        elif e.forces.contacts.number > 0 or e.forces.changing > 0:
             clear = hold_back(e, target.at, loose, clear, u, R, du, dm) > 0
         moving = False
         add_multiple(1.0, du, u)

@@ -210,8 +210,8 @@ class Search:
         if early and self.stable:
             yield "descent", self.descent
         # the last one may take as many iterations as it needs; what yields may need many steps
-        few = (self.stabilised_by_loads or self.stable and not early) and not (
-            system.histories.of_beams.history.size)
+        few = not system.histories.path_dependent and (
+            self.stabilised_by_loads or self.stable and not early)
         yield "smaller load steps", partial(self.load_steps, "mixed", few)
         if self.stable and not early:
             yield "descent", self.descent

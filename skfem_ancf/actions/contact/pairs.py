@@ -121,6 +121,12 @@ PAIRS: TypeAlias = PairTables
 FACING: TypeAlias = Annotated[Facing, MADE]
 
 
+def search_anew(pairs: list[PairTables]) -> None:
+    """Forget which facets are near, and where the last step began."""
+    for pair in pairs:
+        pair.skin[:], pair.start_at[:] = 0.0, np.nan
+
+
 @primitive("skfem_ancf.equations.loops")
 def pair_tables(tables, k):
     """The PairTables number k of :class:`~skfem_ancf.actions.forces.kernels.ForceTables`."""
