@@ -458,7 +458,7 @@ def solve_many(A, X):
 def solve_columns(A, ld, width, x):
     """Solve in place with L D L^T factors A of a symmetric band, real or complex; x is (n,)."""
     ab = A.reshape(-1, ld).T  # whole columns, of which BLAS needs no copy
-    tbsv = blas.ztbsv if np.iscomplexobj(A) else blas.dtbsv
+    tbsv = blas.ztbsv if A.dtype.kind == "c" else blas.dtbsv
     y = tbsv(width, ab, x, lower=1, diag=1) / ab[0]
     x[:] = tbsv(width, ab, y, lower=1, trans=1, diag=1)
 
