@@ -257,6 +257,11 @@ class BoundForce(Bound):
         return None if len(self.links) else []
 
 
+def slope_at_zero(function: Callable[[float], Any], step: float) -> Any:
+    """The derivative of a function of a number at 0, by its values at plus and minus a step."""
+    return (function(step) - function(-step)) / (2.0 * step)
+
+
 def differences(function: Callable[[Array], Any], x: Array) -> Array:
     """Derivative of a function of an array by central differences."""
     step = STEP * max(1.0, float(np.abs(x).max(initial=0.0)))
@@ -599,11 +604,6 @@ def _matrix_on_pairs(where, derivative):
     return matrix if sparse.issparse(derivative) else matrix.toarray().reshape(n, 2, n, 2)
 
 
-def _pairs_and_history(where, found):
-    force, history = found
-    return _pairs(where, force), history
-
-
 def _number(where, energy):
     return energy if np.iscomplexobj(energy) else float(energy)
 
@@ -612,7 +612,8 @@ def _number(where, energy):
 #: a result on all degrees of freedom one on pairs of those of the item.
 OF_ITEMS: dict[str, tuple[str, Any]] = {
     **{name: (name, _pairs) for name in ("force", "mean_force", "mean")},
-    "evaluate": ("evaluate", _pairs_and_history), "stiffness": ("stiffness", _matrix_on_pairs),
+    "evaluate": ("evaluate", lambda where, found: (_pairs(where, found[0]), found[1])),
+    "stiffness": ("stiffness", _matrix_on_pairs),
     "resistance": ("damping", _matrix_on_pairs),
     "mean_stiffness": ("mean_stiffness", _matrix_on_pairs),
     **{name: (name, lambda where, found: found) for name in (

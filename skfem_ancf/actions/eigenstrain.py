@@ -332,14 +332,6 @@ def _evaluated(name, f, x, y):
     return ask_array(f"{name}(x, y)", np.shape(x), f, x, y, number=True)
 
 
-def require_alone(loads: Sequence[Any]) -> None:
-    strains = [load for load in loads if isinstance(load, EigenStrain)]
-    for load in strains:
-        refuse(load.grows and sum(other.beam is load.beam for other in strains) > 1, "the material "
-               "of {!r} is nonlinear, so eigenstrains cannot be superposed: give their sum as one, "
-               "a function of (x, y), or such a function times one of t", load.beam)
-
-
 def _of_fibres(beam, eigen):
     """The kernel's arguments for a cable, and the linear stresses, a list for each table."""
     rules, tables = list(beam.across.rules(8)), beam.kernel.tables

@@ -11,14 +11,14 @@ import numpy as np
 
 from ..actions.forces.springs import Turns
 from ..actions.joints.base import Joint
-from ..beam import Domain, WhichBeam, WhichMember, require_body
+from ..beam import WhichBeam, WhichMember, require_body
 from ..core import (Array, ArrayLike, Place, StrPath, progress_bar, refuse, require_finite,
                     require_index)
 from ..equations.system import System
 from ..io import PvdWriter, to_xarray
 from ..recovery.resultants import Resultants, over_time
-from ..results.output import history_html, report_of_history
-from ..results.state import MaterialPoints, Reaction, SpringForces, State
+from ..results.output import history_html, report_of_history, total_force
+from ..results.state import MaterialPoints, Reaction, State
 from ..visuals.matplotlib import animate, plot_curve, plot_state
 from ..visuals.pyvista import Series
 from .base import Motion, Motions, Scheme
@@ -29,20 +29,12 @@ from .sensors import Readings
 
 def momentum(system: System, v: Array) -> Array:
     """Linear momentum of a velocity (N,), shape (2,)."""
-    p, total = system.mass.multiply(v), np.zeros(2)
-    for member, s in zip(system.members, system.slices):  # a unit translation moves r alone
-        total += (member.rigid_motions()[:, :2].T @ p[s] if isinstance(member, Domain) else
-                  p[s].reshape(-1, member.nd)[:, :2].sum(axis=0))
-    return total
+    return total_force(system, v, system.mass.multiply(v))[:2]
 
 
 def angular_momentum(system: System, u: Array, v: Array) -> float:
     """Angular momentum about the origin, for displacement and velocity (N,)."""
-    p, total = system.mass.multiply(v), 0.0
-    for member, s in zip(system.members, system.slices):
-        q, pb = (member.q0 + u[s]).reshape(-1, 2), p[s].reshape(-1, 2)
-        total += np.sum(q[:, 0] * pb[:, 1] - q[:, 1] * pb[:, 0])
-    return float(total)
+    return float(total_force(system, u, system.mass.multiply(v))[2])
 
 
 #: Number of states whose fields are recovered together.
@@ -63,7 +55,7 @@ def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> S
                  origin=(scheme, arrays), memory=y.history)
 
 
-class History(MaterialPoints, SpringForces):
+class History(MaterialPoints):
     """A motion at its stored instants.
 
     Parameters
@@ -205,6 +197,11 @@ class History(MaterialPoints, SpringForces):
     def joint_force(self, joint: Joint) -> Array:
         """Multipliers of a joint, its force on the first beam, at all instants, shape (nt, m)."""
         return np.array([state.joint_force(joint) for state in self])
+
+    def spring_force(self, spring: Any = 0) -> Array:
+        """Force of a spring at all instants, shape (nt,), as of
+        :meth:`State.spring_force <skfem_ancf.results.State.spring_force>`."""
+        return np.array([state.spring_force(spring) for state in self])
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
         """Support reactions at a boundary at all instants.

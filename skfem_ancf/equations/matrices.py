@@ -196,8 +196,12 @@ class StrainTangent:
     def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:
         """The part S (n, n) for stresses (k,), multipliers (m,) and a load factor."""
         u, _, t, time = self._at
-        S = [_beam_geometric(beam, u[s], own) for beam, s, own in zip(
-            self.system.beams, self.system.slices, np.split(stress, self._first))]
+        S = []
+        for beam, s, own in zip(self.system.beams, self.system.slices,
+                                np.split(stress, self._first)):
+            S.append(sparse.csr_matrix((beam.N, beam.N)) if not np.any(own) else sparse.csr_matrix(
+                (beam.kernel.geometric(u[s], own.reshape(beam.mesh.nelements, -1)).ravel(),
+                 entries_of(element_dofs(beam))), shape=(beam.N, beam.N)))
         rigid = self.system.N - sum(part.shape[0] for part in S)
         if rigid:
             S.append(sparse.csr_matrix((rigid, rigid)))
@@ -303,14 +307,6 @@ def _beam_rows(beam, kernel, u):
     first = n * np.arange(len(stress) + 1)
     return (*(sparse.csr_matrix((x.ravel(), j, first), shape=(len(stress), beam.N))
               for x in (B, CB)), stress)
-
-
-def _beam_geometric(beam, u, stress):
-    """Geometric stiffness of a beam, sparse."""
-    if not np.any(stress):
-        return sparse.csr_matrix((beam.N, beam.N))
-    S = beam.kernel.geometric(u, stress.reshape(beam.mesh.nelements, -1))
-    return sparse.csr_matrix((S.ravel(), entries_of(element_dofs(beam))), shape=(beam.N, beam.N))
 
 
 def is_symmetric(S: csr_matrix, sizes: Array) -> bool:

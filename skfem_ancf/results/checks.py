@@ -103,7 +103,11 @@ def check(state: Any) -> Checks:
                        np.max(stretches), 0.0))
         hooke = any(isinstance(one.law(), LinearLaw) for one, _, _ in materials_of(domain))
         found += _strained(domain, hooke, *values[-1][1:3])
-    found += pushed_points(state.system) + state._not_recovered
+    found += pushed_points(state.system)
+    if state.converged and state.t is None and state.base is None:
+        found += [f"strain and stress{_of(beam)} are those of the elements, recovery failed: {why}"
+                  for k, (beam, why) in enumerate(zip(state.beams, state.recovered.values()))
+                  if state._recoveries[k].failed]
     worst = None
     if has_strength(state):
         worst = state.extremes(count=1)[0]

@@ -98,49 +98,6 @@ class MaterialPoints(NearMisses):
         return found.angular_velocity(self.u[..., s], self.v[..., s])
 
 
-class SpringForces:
-    """The method of states and histories for forces in springs."""
-
-    system: Any
-    u: Any
-    v: Any
-    base: Any = None
-    memory: Any = None
-    _columns: Any
-
-    def spring_force(self, spring: Any = 0) -> Any:
-        """Tension of a spring, or moment of a torsional spring against its rotation.
-
-        The force of the dashpot is included. A history returns an array of all instants, (nt,).
-
-        Parameters
-        ----------
-        spring
-            One of ``scene.elements``, or its number among the springs and torsional springs of the
-            scene, in the order in which they were added.
-
-        Examples
-        --------
-        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
-        >>> beam = Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5),
-        ...             StVenantKirchhoff(1e9, 0.3), width=0.1)
-        >>> scene = Scene(beam).pin("left").spring(100.0, ((1, 0), (1, 1)), length=0.9)
-        >>> state = scene.line_load((0, -20.0)).solve_static()
-        >>> round(state.spring_force(), 2)
-        10.0
-        """
-        found, base = spring_of(self.system.forces.elements, spring), self.base
-
-        def at(u, v, memory, start=None):
-            self.system.after(memory).forces.recall()
-            return spring_force(found, u, v, start)
-
-        if self.u.ndim > 1:
-            memories = (one if one.size else None for one in self._columns["history"])
-            return np.array([at(*row) for row in zip(self.u, self.v, memories)])
-        return at(self.u, self.v, self.memory, None if base is None else base.u)
-
-
 logger = logging.getLogger(__name__)
 
 #: Difference of axial coordinates (element + xi) that is round-off.
@@ -166,7 +123,7 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-class State(Immutable, MaterialPoints, SpringForces, Output):
+class State(Immutable, MaterialPoints, Output):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters
@@ -596,15 +553,6 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
             out[k if beam.name is None else beam.name] = self._recoveries[k].why
         return out
 
-    @property
-    def _not_recovered(self) -> list[str]:
-        """Findings about beams of an equilibrium whose recovery failed."""
-        if not self.converged or self.t is not None or self.base is not None:
-            return []
-        return [f"strain and stress{'' if beam.name is None else f' of beam {beam.name!r}'} are "
-                f"those of the elements, recovery failed: {why}" for k, (beam, why) in enumerate(
-                    zip(self.beams, self.recovered.values())) if self._recoveries[k].failed]
-
     @cached_property
     def _recoveries(self):
         return {}
@@ -759,6 +707,30 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
             total = total + self.multipliers @ system.constraints.full_jacobian(
                 self._acted, self._time)
         return total
+
+    def spring_force(self, spring: Any = 0) -> float:
+        """Tension of a spring, or moment of a torsional spring against its rotation, with the force
+        of the dashpot.
+
+        Parameters
+        ----------
+        spring
+            One of ``scene.elements``, or its number among the springs and torsional springs of the
+            scene, in the order in which they were added.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5),
+        ...             StVenantKirchhoff(1e9, 0.3), width=0.1)
+        >>> scene = Scene(beam).pin("left").spring(100.0, ((1, 0), (1, 1)), length=0.9)
+        >>> state = scene.line_load((0, -20.0)).solve_static()
+        >>> round(state.spring_force(), 2)
+        10.0
+        """
+        found = spring_of(self.system.forces.elements, spring)
+        self._equations.forces.recall()
+        return spring_force(found, self.u, self.v, None if self.base is None else self.base.u)
 
     def joint_force(self, joint: Joint) -> Array:
         """Force of a joint on its first beam, in the order of ``joint.equations``; (m,)."""

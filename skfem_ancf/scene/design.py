@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from ..actions.bound import derivative
+from ..actions.bound import derivative, slope_at_zero
 from ..core import (NO_FACTORS, Array, ArrayLike, ConvergenceError, InputError, ask, ask_array,
                     refuse, refuse_any, require_finite, require_flag, require_function,
                     require_integer, require_module, require_option)
@@ -318,11 +318,12 @@ class Design:
         return np.concatenate([*parts, seen, *(frozen.rows(scene) for frozen in self._frozen)])
 
 
-def require_same_size(system: Any, N: int, m: int) -> None:
-    """Raise InputError for other numbers of degrees of freedom or of joint equations."""
+def require_same_size(system: Any, N: int, m: int) -> Any:
+    """The constraints of equations of this size; InputError for other DOFs or joint equations."""
     found = system.N, system.constraints.m
     refuse(found != (N, m), "the parameters change the number of degrees of freedom or of joint "
            "equations, from {} and {} to {} and {}", N, m, *found)
+    return system.constraints
 
 
 class Differences:
@@ -500,13 +501,14 @@ def _along(function, state, z):
 
 # eigenvalues as readings
 
-def residual(system: Any, u: Array, multipliers: Array, load: float, memory: Any = None) -> Array:
-    """The equations of statics, (N + m,); those of supports at fixed degrees of freedom."""
-    c = system.constraints
-    force = system.after(memory).internal_force(u, None, load)
-    rest = force - load * system.external_force(u) + c.sparse_jacobian(u, load).T @ multipliers
-    rest[c.fixed] = u[c.fixed] - c.values(load)
-    return np.concatenate([rest, c.constraint(u, load)])
+def residual(system: Any, u: Array, multipliers: Array, load: float, memory: Any = None,
+             t: float | None = None) -> Array:
+    """The equations without inertia, (N + m,); those of supports at fixed degrees of freedom."""
+    c, time = system.constraints, load if t is None else t
+    rest = system.after(memory).internal_force(u, t, load) - load * system.external_force(u, t) + (
+        c.sparse_jacobian(u, time).T @ multipliers)
+    rest[c.fixed] = u[c.fixed] - c.values(time)
+    return np.concatenate([rest, c.constraint(u, time)])
 
 
 class Frozen(NamedTuple):
@@ -640,9 +642,8 @@ class BucklingLoad(EigenReading):
         du, _, multipliers = at.response()
         geometric = x @ (at.geometric(at.stresses(du), multipliers, 1.0) @ x)
         # the geometric stiffness is linear in the stress: strains of second order
-        step = SMALL / np.abs(shape / system.constraints.coordinate_sizes).max()
-        up, down = (_tangent(system, sign * step * shape) for sign in (1.0, -1.0))
-        bent = ((up.B - down.B) @ x) / (2.0 * step)
+        bent = slope_at_zero(lambda s: _tangent(system, s * shape).B, SMALL / np.abs(
+            shape / system.constraints.coordinate_sizes).max()) @ x
         turned = second(State(system, 0.0 * shape, 0.0), np.append(shape, 0.0 * multipliers))
         a, b = (part[:, 0] for part in Inverse(at).solve_both(
             (at.CB.T @ bent)[:, None], turned[system.N:, None]))
@@ -695,8 +696,7 @@ class CriticalLoad(EigenReading):
         u, l = np.array(state.u), state.multipliers
         vector = np.append(found.mode, found.critical.multiplier_rate)
         K, J = matrices_of(system, state)[2::2]
-        by_load = sum(sign * residual(system, u, l, load + sign * LOADED, state.memory)
-                      for sign in (1.0, -1.0)) / (2.0 * LOADED)
+        by_load = slope_at_zero(lambda s: residual(system, u, l, load + s, state.memory), LOADED)
         left, fixed = vector.copy(), system.constraints.fixed
         left[fixed] = -(K @ found.mode + J.T @ vector[system.N:])[fixed]
         if found.kind == "limit":
@@ -708,8 +708,7 @@ class CriticalLoad(EigenReading):
                           system.constraints, none)
         bent = np.append(second(state, vector), 0.0)[:, None]
         adjoint = border.adjoint([1.0], bent)[:-1, 0]
-        stiffer = sum(sign * one.rows(system, load + sign * LOADED).sum()
-                      for sign in (1.0, -1.0)) / (2.0 * LOADED)
+        stiffer = slope_at_zero(lambda s: one.rows(system, load + s).sum(), LOADED)
         factor = -1.0 / (stiffer - adjoint @ by_load)
         size = np.abs(left * by_load).sum() + np.abs(adjoint * by_load).sum()
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeV
 
 
 from ..actions.bound import BoundConstraint, BoundForce
-from ..actions.eigenstrain import EigenStrain, Temperature, require_alone
+from ..actions.eigenstrain import EigenStrain, Temperature
 from ..actions.energy import Energy
 from ..actions.form_load import FormLoad
 from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
@@ -176,7 +176,11 @@ class Model(NearMisses):
                 if isinstance(one, Support):
                     one.hold(fixed)
                 elif isinstance(one, EigenStrain):
-                    require_alone([*self.loads, *bound])
+                    others = [x for x in (*self.loads, *bound) if x is not one and isinstance(
+                        x, EigenStrain) and x.beam is one.beam]
+                    refuse(one.grows and others, "the material of {!r} is nonlinear, so "
+                           "eigenstrains cannot be superposed: give their sum as one, a function "
+                           "of (x, y), or such a function times one of t", one.beam)
             self._entries, self._fixed, self._system = self._entries + tuple(entries), fixed, None
         return bound
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import lsqr
 
-from ..actions.bound import BoundConstraint, BoundForce, MemberForce
+from ..actions.bound import BoundConstraint, BoundForce, MemberForce, slope_at_zero
 from ..actions.tables import mean_external_force
 from ..beam import element_dofs, entries_of
 from ..core import (Array, ArrayLike, refuse, require_flag, require_integer, require_option,
@@ -274,20 +274,15 @@ class _Step:
                                       if c.m else np.zeros(0) for x in sides)
         self._solver = self._linearised(h * gamma * b, self._kick * b)
 
-    def _same(self, system):
-        """A system with other parameters, and its constraints."""
-        require_same_size(system, len(self.y.u), len(self.y.multipliers))
-        return system, system.constraints
-
     def equations(self, scene: Any) -> Array:
         """The equations of a scene with other parameters at this step, (3 (N + m),)."""
-        (system, c), y = self._same(scene.system), self.y
+        system, y = scene.system, self.y
+        c = require_same_size(system, len(y.u), len(y.multipliers))
         J, M, static = c.sparse_jacobian(y.u, y.t), system.mass.multiply, self._design.state
         instant = INSTANT * self._h
         rate = _rate(instant, system, y.u, y.v, y.t)
-        late, early = (_rate(instant, system, y.u + step * y.v, y.v, y.t + step)
-                       for step in (instant, -instant))
-        bend = J @ y.acceleration + (late - early) / (2.0 * instant)  # the second rate
+        bend = J @ y.acceleration + slope_at_zero(  # the second rate
+            lambda s: _rate(instant, system, y.u + s * y.v, y.v, y.t + s), instant)
         if self._raw is not None:
             v, a = self._raw
             # forces of damping are those of the velocity of the scheme, before the joints
@@ -416,8 +411,8 @@ class _MeanStep(_Step):
 
     def equations(self, scene: Any) -> Array:
         """The equations of a scene with other parameters at this step, (2 (N + m),)."""
-        (system, c), y, start, M = (self._same(scene.system), self.y, self._begin,
-                                    scene.system.mass.multiply)
+        system, y, start, M = scene.system, self.y, self._begin, scene.system.mass.multiply
+        c = require_same_size(system, len(y.u), len(y.multipliers))
         J = c.sparse_jacobian(self._middle, self._t)
         first = (M((self._velocity - start.v) / self._h) + _mean(system, self._t, start.u, y.u)
                  + J.T @ self._force - c.mean_turning(start.u, y.u, start.v, y.v, self._t,
@@ -442,10 +437,8 @@ class _MeanStep(_Step):
             late, early = late + turning + D, early + turning - D
         s, kick = INSTANT * h, c.curvature(u, t, self._impulse)
         # derivatives along the mean velocity: of J, and of the curvature if Phi is not quadratic
-        by_impulse, third = (
-            (f(u + s * self._turn) - f(u - s * self._turn)) / (2.0 * s)
-            for f in (lambda x: c.sparse_jacobian(x, t),
-                      lambda x: c.curvature(x, t, self._impulse)))
+        by_impulse = slope_at_zero(lambda x: c.sparse_jacobian(u + x * self._turn, t), s)
+        third = slope_at_zero(lambda x: c.curvature(u + x * self._turn, t, self._impulse), s)
         turned = 0.5 * (c.curvature(u, t, self._force) + third)
         A = late + turned + 2.0 / h**2 * M
         self._before, more = (self._map({
@@ -457,8 +450,7 @@ class _MeanStep(_Step):
         self._kept = self._map({(2, 1): -more / h, (2, 3): 1.0 - more, (3, 1): -1.0 / h,
                                 (5, 4): 1.0 - more}, END, START)
         J = c.sparse_jacobian(y.u, y.t)
-        slope = (c.sparse_jacobian(y.u + s * y.v, y.t + s)
-                 - c.sparse_jacobian(y.u - s * y.v, y.t - s)) / (2.0 * s)
+        slope = slope_at_zero(lambda x: c.sparse_jacobian(y.u + x * y.v, y.t + x), s)
         return _factors([
             [A, self._J.T, 0.25 * kick, by_impulse.T], [J, None, None, None],
             [0.5 * kick - 2.0 / h * M, None, M, self._J.T], [slope, None, J, None]], A, c, h)
@@ -545,18 +537,15 @@ def _mean(system, t, u0, u1):
 
 
 def _residual(t, system, u, a, l, v):
-    """The equations of motion at the end of a step, (N + m,); values of supports where fixed."""
-    c = system.constraints
-    rest = (system.mass.multiply(a) + system.internal_force(u, t) - system.external_force(u, t)
-            + c.sparse_jacobian(u, t).T @ l)
+    """The equations of motion at the end of a step, (N + m,)."""
+    out, force = residual(system, u, l, 1.0, None, t), system.mass.multiply(a)
     if system.damped:
-        rest = rest + system.damping_force(u, v, t)
-    rest[c.fixed] = c.values(t)
-    return np.concatenate([rest, c.constraint(u, t)])
+        force = force + system.damping_force(u, v, t)
+    out[:system.N] += np.where(system.constraints.free, force, 0.0)
+    return out
 
 
 def _rate(instant, system, u, v, t):
     """The rate of the joints for a velocity v."""
     c = system.constraints
-    late, early = (c.constraint(u, t + step) for step in (instant, -instant))
-    return c.sparse_jacobian(u, t) @ v + (late - early) / (2.0 * instant)
+    return c.sparse_jacobian(u, t) @ v + slope_at_zero(lambda s: c.constraint(u, t + s), instant)
