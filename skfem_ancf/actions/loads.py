@@ -22,9 +22,8 @@ from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .bound import MemberForce, at_generic_displacements, require_entries, user_parts
 from .item import Item, takes
-from .places import Vector, dense_entries, members_at, nearest_of, section
-from .symbols import (ARROWS, Symbol, arrows_along, at_node, faces_of, force_symbol, inside,
-                      values_at)
+from .places import Vector, at_node, dense_entries, members_at, nearest_of, section
+from .symbols import (ARROWS, Symbol, arrows_along, faces_of, force_symbol, inside, values_at)
 
 #: Warn of a traction on a cable if its neglected moment exceeds these parts of force times length,
 #: and of force times height (round-off).

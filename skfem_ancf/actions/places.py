@@ -118,29 +118,31 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
         used, = np.nonzero((mean != 0.0) | (line != 0.0))
         dofs = layout.offset(member) + 2 * used + np.array([[0], [1]])
         return Vector(centre, dofs, mean[used]), Vector(along, dofs, line[used])
+    node = None
     if isinstance(member, RigidBody):
         dofs, weights = member.direction()
-        return (point(layout, member, place),
-                _of(layout, member, member.q0[dofs] @ weights, dofs, weights))
-    try:
-        node = node_of(member.mesh, place)
-    except MeshError:
-        if not is_point(place):
-            raise
-        e, X = locate(member, place)  # inside an element
-        if not member.has_sections:
-            X = np.array([X[0], 0.5])
-            place = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-        dofs, _ = probe_reference(member, e, X)
-        weights = direction_weights(member, e, float(X[0]))
-        return (point(layout, member, place),
-                _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights))
-    dofs, weights = direction_of(member, node)
-    direction = _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights)
-    if is_point(place) and member.has_sections:
-        return point(layout, member, place), direction
-    first = layout.offset(member) + node * member.nd
-    return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
+    else:
+        try:
+            node = node_of(member.mesh, place)
+            dofs, weights = direction_of(member, node)
+        except MeshError:
+            if not is_point(place):
+                raise
+            e, X = locate(member, place)  # inside an element
+            if not member.has_sections:
+                X = np.array([X[0], 0.5])
+                place = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+            dofs, _ = probe_reference(member, e, X)
+            weights = direction_weights(member, e, float(X[0]))
+    on_axis = node is not None and not (is_point(place) and member.has_sections)
+    return (at_node(layout, member, node) if on_axis else point(layout, member, place),
+            _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights))
+
+
+def at_node(layout: Layout, beam: Any, node: Any) -> Vector:
+    """Position of the axis at a node."""
+    first = layout.offset(beam) + node * beam.nd
+    return Vector(beam.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1))
 
 
 def _section_of_frame(layout, beam, at):

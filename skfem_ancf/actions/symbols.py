@@ -11,7 +11,7 @@ from ..beam import Beam, Domain, Layout, RigidBody
 from ..beam.kinematics import direction_weights, probe_reference
 from ..core import Array
 from ..mesh.places import facets_of
-from .places import Vector, point
+from .places import Vector, at_node, point
 
 #: Largest number of arrows of a distributed load on one chain or side, and on one beam.
 ARROWS, MOST = 9, 200
@@ -63,12 +63,6 @@ def force_symbol(at: Iterable[Vector], force: Any, turn: Iterable[Vector] = (),
     force = np.reshape(force, (-1, 2))
     size = float(np.max(np.hypot(*force.T), initial=0.0))
     return Symbol("force", tuple(at), force / (size or 1.0), size, "", tuple(turn), show)
-
-
-def at_node(layout: Layout, beam: Beam, node: int) -> Vector:
-    """Position of the axis at a node."""
-    first = layout.offset(beam) + node * beam.nd
-    return Vector(beam.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1))
 
 
 def inside(layout: Layout, beam: Any, e: int, xi: float, eta: float = 0.5) -> Vector:

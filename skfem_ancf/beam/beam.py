@@ -273,7 +273,12 @@ class Beam(Immutable):
     def probe(self, point: ArrayLike) -> tuple[Array, Array]:
         """Numbers (2, n) and weights (n,) of the DOFs in the position of a material point. The
         position is ``q[dofs] @ weights``."""
-        return kinematics.probe(self, point)
+        e, X = kinematics.locate(self, point)
+        refuse(not self.has_sections and abs(X[1] - 0.5) > self.finder.allowed, "the point {!r} is "
+               "off the axis of a cable, where the position is not linear in the degrees of "
+               "freedom: use a point of the axis, and scene.moment for a moment on an end section",
+               point)
+        return kinematics.probe_reference(self, e, X)
 
     @cached_property
     def size(self) -> float:

@@ -42,17 +42,8 @@ def locate(beam: Any, point: Any) -> tuple[int, Array]:
     return int(e[0]), X[:, 0]
 
 
-def probe(beam: Any, point: Any) -> tuple[Array, Array]:
-    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`."""
-    e, X = locate(beam, point)
-    refuse(not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed, "the point {!r} is "
-           "off the axis of a cable, where the position is not linear in the degrees of freedom: "
-           "use a point of the axis, and scene.moment for a moment on an end section", point)
-    return probe_reference(beam, e, X)
-
-
 def probe_reference(beam: Any, e: int, X: Array) -> tuple[Array, Array]:
-    """As :func:`probe`, for a point (2,) of the reference cell."""
+    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`, for a point (2,) of the reference cell."""
     dofs = beam.mesh.t[0, e] * beam.nd + np.arange(2 * beam.nd).reshape(-1, 2).T
     X = np.reshape(X, (2, 1, 1))
     return dofs, beam.element.values(beam.mesh.mapping(), X, np.array([e])).ravel()

@@ -89,6 +89,13 @@ class Motions(Sequence[Motion]):
         return Motion(**row, memory=self._memory(k))
 
 
+def columns_of(motions: Sequence[Motion]) -> dict[str, Array]:
+    """The arrays (nt, ...) of Motions by their names; they are copies."""
+    none = np.zeros(0)
+    return {name: np.array([none if (x := getattr(y, name)) is None else x for y in motions])
+            for name in COLUMNS}
+
+
 def interpolate(a: Motion, b: Motion, t: float) -> Motion:
     """Interpolate between two instants: cubic Hermite in u, linear in the accelerations."""
     h, s = b.t - a.t, (t - a.t) / (b.t - a.t)

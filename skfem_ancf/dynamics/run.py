@@ -16,7 +16,7 @@ from ..core import (AncfError, Array, CheckpointError, ModelWarning, ask_number,
                     warn)
 from ..equations.system import System
 from ..results.state import State
-from .base import COLUMNS, Motion, Scheme, in_blocks, interpolate
+from .base import COLUMNS, Motion, Scheme, columns_of, in_blocks, interpolate
 from .history import History, state_of
 from .integrator import DEPTH, Integrator, StageIntegrator, TimeStepFailed
 from .sensors import Recorder, Sensor
@@ -255,7 +255,7 @@ class Run:
             self._follow(turns, self.y)
         self.recorder.record([self.y])
         if task.t_eval is None or task.t_eval[0] <= task.t_start:
-            self._append(self.y)
+            self._stored.append(columns_of([self.y]))
             self._next = 1
 
     def _begin_segment(self, u, v, history, first):
@@ -409,20 +409,16 @@ class Run:
         """Store the instants that were asked for between two Motions."""
         wanted = self.task.t_eval
         if wanted is None:
-            self._append(new)
+            self._stored.append(columns_of([new]))
             return
         until = new.t + 1e-14 * max(abs(self.task.t_start), abs(self.task.t_end))
         while self._next < len(wanted) and wanted[self._next] <= until:
             t = float(wanted[self._next])
-            self._append(new if t == new.t else self._interpolated(old, new, t))
+            self._stored.append(columns_of([new if t == new.t else self._interpolated(
+                old, new, t)]))
             self._next += 1
         if self.event is not None and (not self._stored or self._stored[-1]["t"][-1] < new.t):
-            self._append(new)
-
-    def _append(self, y):
-        none = np.zeros(0)  # copies free the rest of a block
-        self._stored.append({name: np.array([none if x is None else x]) for name, x in (
-            (name, getattr(y, name)) for name in COLUMNS)})
+            self._stored.append(columns_of([new]))
 
     def _interpolated(self, old, new, t):
         """The motion within a step, by a shorter step from the same start."""

@@ -93,21 +93,21 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
 def _diverges(system):
     """True if a motion grows, by the factors: an eigenvalue has a negative real part."""
     # As of equal masses at the nodes.
-    at, inverse = inverse_on_positions(system)
-    if len(at) <= DENSE:
-        values = np.linalg.eigvals(np.array([inverse(y)[at] for y in np.eye(len(at))]))
+    _, G = inverse_on_positions(system)
+    if isinstance(G, np.ndarray):
+        values = np.linalg.eigvals(G)
         return bool(np.any(values.real < -ROUND_OFF * np.abs(values).max(initial=0.0)))
-    G = LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
     try:
-        least, largest = (eigs(G, k=1, which=which, v0=G @ np.ones(len(at)), tol=1e-3,
+        least, largest = (eigs(G, k=1, which=which, v0=G @ np.ones(G.shape[0]), tol=1e-3,
                                return_eigenvectors=False)[0] for which in ("SR", "LM"))
     except ArpackNoConvergence:
         return False
     return bool(least.real < -ROUND_OFF * abs(largest))
 
 
-def inverse_on_positions(system: Any) -> tuple[Array, Callable[[Array], Array]]:
-    """Free positions of nodes (n,), and a function of forces there (n,): the displacement (N,)."""
+def inverse_on_positions(system: Any) -> tuple[Callable[[Array], Array], Any]:
+    """A function of forces on the free positions of nodes (n,): the displacement (N,); and the
+    compliance there, (n, n), dense if there are few."""
     # By the factors of the tangent.
     at = np.nonzero((position_weights(system) > 0) & system.constraints.free)[0]
     none = np.zeros(system.constraints.m)
@@ -117,7 +117,9 @@ def inverse_on_positions(system: Any) -> tuple[Array, Callable[[Array], Array]]:
         b[at] = np.ravel(y)
         return system.solver.solve(b, none)[0]
 
-    return at, inverse
+    if len(at) <= DENSE:
+        return inverse, np.array([inverse(y)[at] for y in np.eye(len(at))])
+    return inverse, LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
 
 
 def _is_symmetric(system):

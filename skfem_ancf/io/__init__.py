@@ -281,7 +281,8 @@ class PvdWriter:
 
 #: The dimension and the labels of the components of vectors and tensors, and their columns in
 #: arrays of VTK.
-PARTS = {2: ("component", ("x", "y"), (0, 1)), 3: ("tensor", ("xx", "yy", "xy"), (0, 1, 3))}
+PARTS = {1: ("", (), (0,)), 2: ("component", ("x", "y"), (0, 1)),
+         3: ("tensor", ("xx", "yy", "xy"), (0, 1, 3))}
 #: Of a History, arrays (nt,).
 ENERGIES = "strain_energy", "kinetic_energy", "potential_energy", "total_energy", "dissipated"
 
@@ -331,21 +332,18 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
         found = states[0].system.points.find(at, beam, line, ask=True)
         x = found.start.reshape(2, -1)
         place = {"x": ("point", x[0]), "y": ("point", x[1])}
-        tables = []
-        for state in states:
-            table = {}
-            for field in wanted:
-                values = np.reshape(state.field(field, found, recover=recover),
-                                    (field.components, -1)).T
-                table[field.name] = values[:, 0] if field.components == 1 else values
-            tables.append((place, table))
+        tables = [(place, {field.name: np.reshape(state.field(field, found, recover=recover),
+                                                  (field.components, -1)).T for field in wanted})
+                  for state in states]
     units, arrays, parts = units_of(states[0]), {}, {}
     for field in wanted:
         values = np.array([table[field.name] for _, table in tables])
-        dims: tuple[str, ...] = ("point",)
-        if field.components > 1:
-            name, labels, _ = PARTS[field.components]
-            dims, parts[name] = ("point", name), list(labels)
+        name, labels, _ = PARTS[field.components]
+        dims: tuple[str, ...] = ("point", name)
+        if name:
+            parts[name] = list(labels)
+        else:
+            dims, values = dims[:1], values[..., 0]
         about = {"long_name": re.sub(r"\s*\$[^$]*\$", "", field.title) or field.name}
         if unit := "1" if field.unit == "1" else units and unit_of(field, units):
             about["units"] = unit
@@ -369,11 +367,8 @@ def _of_body(state, wanted, subdivide, recover, lenient, beam):
     bodies = [body_of(grid, wanted, True, lenient, share=False) for grid in found]
     x = np.concatenate([body.points for body in bodies]).T
     names = np.repeat([grid.name for grid in found], [len(body.points) for body in bodies])
-    table = {}
-    for field in wanted:
-        values = np.concatenate([body.data[field.name] for body in bodies])
-        table[field.name] = values if field.components == 1 else (
-            values[:, PARTS[field.components][2]])
+    table = {field.name: np.concatenate([body.data[field.name] for body in bodies]).reshape(
+        len(names), -1)[:, PARTS[field.components][2]] for field in wanted}
     return {"x": ("point", x[0]), "y": ("point", x[1]), "member": ("point", names)}, table
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..actions.joints.nodes import COMPONENTS, Nodes, chain_ends
 from ..actions.loads import DeadLoad, EndMoment, LineLoad, Load, number_at
-from ..actions.places import members_at
-from ..actions.symbols import Symbol, at_node, force_symbol
+from ..actions.places import at_node, members_at
+from ..actions.symbols import Symbol, force_symbol
 from ..beam import Beam, Layout, RigidBody, WhichBeam, WhichMember
 from ..beam.kinematics import direction
 from ..core import (Array, ArrayLike, InputError, TimeFunction, refuse, require_finite,

@@ -14,7 +14,7 @@ from ..actions.obstacles.obstacle import stiffest
 from ..core import (Array, ArrayLike, ConvergenceError, Immutable, InputError, Interrupted,
                     ModelWarning, progress_bar, refuse, require_finite, require_flag,
                     require_increasing, require_integer, require_option, require_positive, warn)
-from ..dynamics.base import COLUMNS, Motion, Scheme
+from ..dynamics.base import Motion, Scheme, columns_of
 from ..dynamics.history import History, state_of
 from ..dynamics.sensors import Recorder, Sensor
 from ..equations.stability import largest_displacement, position_weights
@@ -444,9 +444,7 @@ class _Record:
         self.t = instant.t
 
     def history(self) -> StepHistory:
-        columns: dict[str, Any] = {name: np.array([
-            np.zeros(0) if (x := getattr(y, name)) is None else x for y in self._motions])
-            for name in COLUMNS}
+        columns = columns_of(self._motions)
         if not self._motions:
             empty = np.zeros((0, self.system.N))
             columns |= {"u": empty, "v": empty, "acceleration": empty}

@@ -347,7 +347,7 @@ class Search:
 
         try:
             with np.errstate(all="ignore"):
-                found = strategies.descend(step, lambda begin: step.iterate(begin, far, down), down)
+                found = strategies.descend(step, far, down)
                 if system.forces.contacts.obstacles:
                     found = self._with_stiff_contact(found, step)
         except NO_FACTORS as error:

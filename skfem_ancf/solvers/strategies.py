@@ -21,7 +21,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import eigsh
 
 from ..actions.contact.contacts import LARGEST_FACTOR, YIELDS, Contacts
 from ..actions.contact.tables import ANCHORED, BILATERAL, is_clear, stiffness_factor
@@ -29,8 +29,8 @@ from ..actions.forces.kernels import nothing_touches
 from ..actions.forces.springs import Turns
 from ..core import NO_FACTORS, Array, handle_of
 from ..core.band import fix
-from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
-                                   position_weights, potential, response, verdict)
+from ..equations.stability import (inverse_on_positions, largest_displacement, position_weights,
+                                   potential, response, verdict)
 from ..equations.system import System
 from .continuation import Point, Tracer
 from .iteration import Equilibrium, LoadStepFailed, StaticResult
@@ -214,15 +214,13 @@ class Descent:
     def _extreme(self, which):
         """The smallest ("SA") or largest ("LA") eigenvalue of K^-1 on the nodal positions, and the
         displacement (N,) by its vector of forces."""
-        at, inverse = inverse_on_positions(self.system)
-        if not len(at):
+        inverse, G = inverse_on_positions(self.system)
+        if not G.shape[0]:
             return 0.0, np.zeros(self.system.N)
-        if len(at) <= DENSE:
-            G = np.array([inverse(y)[at] for y in np.eye(len(at))])
+        if isinstance(G, np.ndarray):
             values, Y = np.linalg.eigh(0.5 * (G + G.T))
         else:
-            G = LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
-            start = G @ np.random.default_rng(0).standard_normal(len(at))
+            start = G @ np.random.default_rng(0).standard_normal(G.shape[0])
             values, Y = eigsh(G, k=1, which=which, v0=start)
         k = 0 if which == "SA" else -1
         return float(values[k]), inverse(Y[:, k])
@@ -236,12 +234,8 @@ def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
     first: tuple[Any, bool] = None, False
     for radius in RADII:
         descent = Descent(system, radius)
-
-        def iterate(begin, descent=descent):
-            return increment.iterate(begin, options, descent)
-
         try:
-            found = descend(increment, iterate, descent)
+            found = descend(increment, options, descent)
         except (LoadStepFailed, *NO_FACTORS) as failure:
             logger.info("no descent at load %.6g: %s", level, failure)
             continue
@@ -252,8 +246,7 @@ def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
     return first
 
 
-def descend(increment: Any, iterate: Callable[..., Equilibrium],
-            descent: Descent) -> Equilibrium:
+def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
     """A stable equilibrium at a load beyond which the path is unstable."""
     # Corrections of :class:`Descent` start from the last stable equilibrium. An unstable point is
     # left along its lowest direction, towards the last stable equilibrium, or to the lower
@@ -261,7 +254,7 @@ def descend(increment: Any, iterate: Callable[..., Equilibrium],
     system, start, load = increment.system, increment.start, increment.load
     u, multipliers = start.u, start.multipliers
     for _ in range(KICKS):
-        found = iterate((u, multipliers))
+        found = increment.iterate((u, multipliers), options, descent)
         u, multipliers = found.u, found.multipliers
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
             return found
