@@ -151,6 +151,11 @@ class Item(Immutable, Bound):
         return other
 
 
+def on_each(item: Any, members: Sequence[int]) -> Sequence[Any]:
+    """An item on the beam that it names, or without one on each of some members, by number."""
+    return (item,) if item.beam is not None else [item._with(beam=k) for k in members]
+
+
 def takes(function: Any, n: int) -> bool:
     """True for a function of n required arguments, as x, y and t."""
     try:

@@ -21,7 +21,7 @@ from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .bound import MemberForce, at_generic_displacements, require_entries, user_parts
-from .item import Item, takes
+from .item import Item, on_each, takes
 from .places import Vector, at_node, dense_entries, members_at, nearest_of, section
 from .symbols import (ARROWS, Symbol, arrows_along, faces_of, force_symbol, inside, values_at)
 
@@ -290,9 +290,7 @@ class Weight(Load):
         self.g = require_finite("g", g, (2,))
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        if self.beam is not None or len(layout.members) == 1:
-            return (self,)
-        return [self._with(beam=k) for k in range(len(layout.members))]
+        return on_each(self, range(len(layout.members)))
 
     def bind(self, beam: Beam | RigidBody) -> Load:
         distribution = Distribution(gravity=self.g) if isinstance(beam, Beam) else None

@@ -522,12 +522,6 @@ def _joined(parts):
 def _fixes(joint, zero):
     """DOFs that a joint fixes, and their factors; None if it does more than that."""
     rows, dofs, factors = joint.entries(zero, 0.0)
-    if len(rows) != len(joint.equations) or not factors.all():
-        return None
-    inorder = list(range(len(rows)))
-    if rows.tolist() == inorder:
-        return dofs, factors
     order = rows.argsort()
-    if rows[order].tolist() != inorder:
-        return None
-    return dofs[order], factors[order]
+    each = rows[order].tolist() == list(range(len(joint.equations)))
+    return (dofs[order], factors[order]) if each and factors.all() else None

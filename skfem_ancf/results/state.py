@@ -12,7 +12,7 @@ from scipy import sparse
 
 from ..actions.bound import MemberForce
 from ..actions.eigenstrain import EigenStrain
-from ..actions.forces.springs import spring_force, spring_of
+from ..actions.forces.springs import spring_force
 from ..actions.item import Item
 from ..actions.joints.base import Joint
 from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
@@ -728,9 +728,9 @@ class State(Immutable, MaterialPoints, Output):
         >>> round(state.spring_force(), 2)
         10.0
         """
-        found = spring_of(self.system.forces.elements, spring)
         self._equations.forces.recall()
-        return spring_force(found, self.u, self.v, None if self.base is None else self.base.u)
+        return spring_force(self.system.forces.elements, spring, self.u, self.v,
+                            None if self.base is None else self.base.u)
 
     def joint_force(self, joint: Joint) -> Array:
         """Force of a joint on its first beam, in the order of ``joint.equations``; (m,)."""

@@ -108,12 +108,10 @@ def shear_factor(layers: Sequence[Layer], order: int) -> float:
     found, one = [], np.ones(SHEAR_POINTS)
     for layer in layers:  # points in each interval with weights, widths and moduli
         law, m = layer.material, layer.measure
-        for low, high, width in m.pieces:
-            half = 0.5 * (high - low)
-            eta = 0.5 * (low + high) - half * np.cos(np.pi * t)
-            width = (width(eta) if callable(width) else width) * layer.width / m.mean
-            found.append((eta, half * np.sin(np.pi * t) * np.pi * w, width * one,
-                          law.axial_modulus * one, law.G * one))
+        for piece in m.pieces:
+            eta, dy, width = piece.rule(SHEAR_POINTS)
+            found.append((eta, dy, width * layer.width / m.mean, law.axial_modulus * one,
+                          law.G * one))
     y, dy, b, E, G = (np.array(rows) for rows in zip(*found))
     EA = np.sum(dy * b * E)
     first = E * b * (y - np.sum(dy * b * E * y) / EA)

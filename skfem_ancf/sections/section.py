@@ -36,6 +36,13 @@ class Piece(NamedTuple):
     high: float
     width: float | Callable[[Array], Array]
 
+    def rule(self, n: int) -> tuple[Array, Array, Array]:
+        """Points (n,), weights and widths; square roots at the ends are smooth in their angle."""
+        (t, w), half = gauss(n), 0.5 * (self.high - self.low)
+        eta = 0.5 * (self.low + self.high) - half * np.cos(np.pi * t)
+        return (eta, half * np.sin(np.pi * t) * np.pi * w,
+                self.width(eta) if callable(self.width) else self.width + 0.0 * eta)
+
 
 class Measure(Immutable):
     """Width and quadrature across a layer, between relative heights ``low`` and ``high``. Rules use
@@ -141,16 +148,8 @@ class Weighted(Measure):
 
     def _discrete(self, n):
         """Points and weights of the discretised measure, exact for degree n."""
-        t, w = gauss(n + 40)
-        t, w = np.pi * t, np.pi * w
-        points, weights = [], []
-        for low, high, width in self.pieces:
-            half = 0.5 * (high - low)
-            eta = 0.5 * (low + high) - half * np.cos(t)
-            b = width(eta) if callable(width) else width
-            points.append(eta)
-            weights.append(half * np.sin(t) * w * b)
-        return np.concatenate(points), np.concatenate(weights)
+        eta, w, b = map(np.concatenate, zip(*(piece.rule(n + 40) for piece in self.pieces)))
+        return eta, w * b
 
     def gauss(self, n: int) -> Rule:
         x, w = self._discrete(2 * n)

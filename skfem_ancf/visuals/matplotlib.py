@@ -102,7 +102,11 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
     'second Piola–Kirchhoff stress $S_{xx}$, beam frame'
     """
     save = page(ax, title, filename, dpi, bbox_inches="tight")
-    states, cmap, unit = _states(state), colormap(cmap), require_text("unit", unit)
+    states = list(state) if isinstance(state, (list, tuple)) else [state]
+    refuse(not states, "there is no state to draw: got an empty list")
+    for one in states:
+        require_like("state", one, "State", "beams", "u_of")
+    cmap, unit = colormap(cmap), require_text("unit", unit)
     _require_flags(colorbar=colorbar, loads=loads, supports=supports, fade=fade, contact=contact)
     symbols = symbols_of(states[-1], loads, supports)
     scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover, scale)
@@ -297,14 +301,6 @@ def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any,
         artists.append(ax.add_collection(LineCollection(
             walls, colors=WALL, linewidths=1.2, zorder=2.5), autolim=False))
     return image, artists
-
-
-def _states(state):
-    states = state if isinstance(state, (list, tuple)) else [state]
-    refuse(not states, "there is no state to draw: got an empty list")
-    for one in states:
-        require_like("state", one, "State", "beams", "u_of")
-    return states
 
 
 def colour_bar(ax: Any, image: Any, extend: str, label: str) -> None:

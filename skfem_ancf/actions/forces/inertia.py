@@ -11,7 +11,7 @@ from scipy import sparse
 from ...beam import Beam, Layout, WhichBeam, WhichMember
 from ...core import (Array, ArrayLike, refuse, require_finite, require_finite_scalar,
                      require_not_negative, shown)
-from ..item import Item
+from ..item import Item, on_each
 from ..places import Vector, point, section
 from ..symbols import Symbol
 from .base import ForceElement, KernelElement
@@ -110,9 +110,7 @@ class RotatingFrame(ForceElement):
         self.center, self.beam = require_finite("center", center, (2,)), beam
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        if self.beam is not None:
-            return (self,)
-        return [self._with(beam=k) for k in range(len(layout.members))]
+        return on_each(self, range(len(layout.members)))
 
     def bind(self, layout: Layout) -> list[Vector]:
         member, first = layout.beam(self.beam), layout.offset(self.beam)

@@ -15,7 +15,7 @@ from ...beam import Layout, RigidBody, WhichBeam, on_body, select_beam
 from ...core import (Array, InputError, Place, ask_number, gauss, refuse, require_finite_scalar,
                      require_flag, require_function, require_integer, require_not_negative, shown)
 from ...mesh.places import points_of_rows
-from ..item import Item
+from ..item import Item, on_each
 from ..loads import EndMoment
 from ..places import GROUND, Vector, both_of, named_place, point, section
 from ..symbols import Symbol, faces_of, middle
@@ -345,21 +345,19 @@ class TorsionalSpring(ElasticElement):
         return f"<TorsionalSpring {self.k!r} at {shown(self.at)}>"
 
 
-def spring_of(elements: Sequence[ForceElement], which: Any) -> Any:
-    """A bound spring, by itself or by its number among the springs and torsional springs."""
-    springs = [one for one in elements if isinstance(one, ElasticElement)]
-    for one in springs:
-        if one is which:
-            return one
-    refuse(not springs, "the scene has no springs")
-    if isinstance(which, ElasticElement):
-        raise InputError(f"{which!r} is not one of scene.elements: name it by its number among the "
-                         f"{len(springs)} springs of the scene, in the order they were added")
-    return springs[require_integer("the number of a spring", which, 0, len(springs) - 1)]
-
-
-def spring_force(spring: Any, u: Array, v: Array, base: Array | None = None) -> float:
+def spring_force(elements: Sequence[ForceElement], which: Any, u: Array, v: Array,
+                 base: Array | None = None) -> float:
     """Tension or moment of a bound spring at u and v (N,); linearised about a base (N,)."""
+    # It is given by itself, or by its number among the springs and torsional springs.
+    springs = [one for one in elements if isinstance(one, ElasticElement)]
+    refuse(not springs, "the scene has no springs")
+    spring = next((one for one in springs if one is which), None)
+    refuse(spring is None and isinstance(which, ElasticElement), "{!r} is not one of "
+           "scene.elements: name it by its number among the {} springs of the scene, in the order "
+           "they were added", which, len(springs))
+    spring = spring or springs[require_integer("the number of a spring", which, 0,
+                                               len(springs) - 1)]
+
     def at(q):
         return np.array([link(q) for link in spring.links])
 
@@ -456,8 +454,7 @@ class Drag(ForceElement):
         self.beam = beam
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
-        return [self._with(beam=layout.number(beam)) for beam in beams]
+        return on_each(self, range(len(layout.beams)))
 
     def bind(self, layout: Layout) -> list[Vector]:
         beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)

@@ -195,7 +195,8 @@ class Obstacle(ForceElement):
         places = starts[:2].reshape(2, -1, m)
         radius = np.hypot(*(places - places.mean(axis=2, keepdims=True))).ravel() + np.abs(offsets)
         E, density = stiffest(beam.across, np.arange(mesh.nelements))
-        k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
+        extent, augmented = float(np.hypot(*np.ptp(mesh.p, axis=1))), self.method == "augmented"
+        k = self.penalty or E / h * min(1.0, h**4 / (12.0 * (SPREAD * extent)**4))
         factor = 1.0 if self.penalty or augmented else LARGEST_FACTOR * max(1.0, E / (h * k))
         law = Law(k, self.width or WIDTH * h, self.friction, self.damping,
                   HARDER * density * h * augmented, float(radius.max()),
@@ -249,11 +250,6 @@ class Obstacle(ForceElement):
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
-
-
-def _default(E, mesh):
-    h, extent = mesh.height, float(np.hypot(*np.ptp(mesh.p, axis=1)))
-    return E / h * min(1.0, h**4 / (12.0 * (SPREAD * extent)**4))
 
 
 def stiffest(across: Any, elements: Array) -> tuple[float, float]:
