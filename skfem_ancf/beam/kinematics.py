@@ -10,7 +10,7 @@ import numpy as np
 from ..core import Array, ModelWarning, first_order, gauss, refuse, warn
 from ..mesh.places import as_point
 from .kernels import CableKernel, SectionKernel
-from .strains import cable_axis, fibres
+from .strains import cable_axis, fibres, points_of_grid
 
 #: Relative deflection of a cantilever by shear that gives a warning if neglected.
 SHEARED = 1e-3
@@ -101,7 +101,7 @@ def gradients(beam: Any, u: Array, X: Array, tind: Array | None) -> tuple[Array,
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
         slopes, frame = beam.element.slopes(mapping, X, tind)
         return np.einsum("ebi,bjep->ijep", u_e, slopes, optimize=True), frame
-    e, P, shape = _flat(beam, X, tind)
+    e, P, shape = points_of_grid(beam.mesh.nelements, X, tind)
     (_, tangent), *axis = cable_axis(beam, u, e, P[0])
     longer, ratio = fibres(beam, e, P, *axis)
     with np.errstate(invalid="ignore"):  # a section may vanish
@@ -118,18 +118,10 @@ def displacements(beam: Any, u: Array, X: Array, tind: Array | None) -> Array:
     out = np.einsum("eki,kep->iep", u_e, beam.element.values(mapping, X, tind), optimize=True)
     if beam.has_sections:
         return out
-    e, P, shape = _flat(beam, X, tind)
+    e, P, shape = points_of_grid(beam.mesh.nelements, X, tind)
     before, after = cable_axis(beam, u, e, P[0])[0]
     turn = (after - before).reshape(2, *shape)
     return out + mapping.offset(X, tind) * np.array([-turn[1], turn[0]])
-
-
-def _flat(beam, X, tind):
-    """Elements (n,), points (2, n), and the shape (nelements, npoints)."""
-    tind = np.arange(beam.mesh.nelements) if tind is None else tind
-    shape = len(tind), X.shape[-1]
-    return (np.repeat(tind, shape[1]), X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0]),
-            shape)
 
 
 def shortest(beam: Any, u: Array) -> float:

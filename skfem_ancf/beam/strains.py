@@ -275,12 +275,16 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:
     """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements."""
-    # X is (2, npoints) or (2, nelements, npoints), tind the elements or None for all; the result is
-    # (3, nelements, npoints).
-    tind = np.arange(beam.mesh.nelements) if tind is None else tind
+    e, points, shape = points_of_grid(beam.mesh.nelements, X, tind)
+    return of(beam, u, e, points, *more).reshape(3, *shape)
+
+
+def points_of_grid(ne: int, X: Array, tind: Array | None) -> tuple[Array, Array, tuple[int, int]]:
+    """Elements (n,), points (2, n) and (nelements, npoints) of X (2, [nelements,] npoints)."""
+    tind = np.arange(ne) if tind is None else tind
     shape = len(tind), X.shape[-1]
-    points = X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0])
-    return of(beam, u, np.repeat(tind, shape[1]), points, *more).reshape(3, *shape)
+    return (np.repeat(tind, shape[1]), X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0]),
+            shape)
 
 
 class BeamLayer:

@@ -255,12 +255,6 @@ class BandMatrix(Band):
         out.flat[out.position(S.row, S.col)] = S.data
         return out
 
-    def skew_size(self, sizes: Array) -> tuple[float, float]:
-        """Largest |entries| of A - A^T and of A, in units of the DOF sizes (n,)."""
-        D = sparse.diags_array(sizes)
-        A = D @ self.tocsc() @ D
-        return float(abs(A - A.T).max()), float(abs(A).max())
-
     def toarray(self) -> Array:
         return self._dense(0, self.n, 0, self.n, np.ones(self.n))
 

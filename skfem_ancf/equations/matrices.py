@@ -20,6 +20,7 @@ from ..beam import element_dofs, entries_of
 from ..beam.strain_energy import body_tangent
 from ..core import Array, BandMatrix, ConvergenceError, InputError, SupportError
 from .condensation import Condensed
+from .rank import is_symmetric
 from .system import System
 
 #: Largest number of refinements; their tolerance, and the largest accepted correction.
@@ -307,14 +308,6 @@ def _beam_rows(beam, kernel, u):
     first = n * np.arange(len(stress) + 1)
     return (*(sparse.csr_matrix((x.ravel(), j, first), shape=(len(stress), beam.N))
               for x in (B, CB)), stress)
-
-
-def is_symmetric(S: csr_matrix, sizes: Array) -> bool:
-    """True if a matrix is symmetric to round-off, with sizes (n,) of its variables."""
-    D = sparse.diags(sizes)
-    S = D @ S @ D
-    gap = abs(S - S.T)
-    return not gap.nnz or bool(gap.max() <= 1e-12 * abs(S).max())
 
 
 def load_stiffness(system: Any, u: Array, load: float, t: float | None = None,

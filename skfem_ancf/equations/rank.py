@@ -29,6 +29,14 @@ DENSE = 300
 MOST, ITERATIONS = 8, 6
 
 
+def is_symmetric(S: Any, sizes: Array, tol: float = 1e-12) -> bool:
+    """True if a sparse matrix is symmetric to round-off, with sizes (n,) of its variables."""
+    D = sparse.diags_array(sizes)
+    S = D @ S @ D
+    gap = abs(S - S.T)
+    return not gap.nnz or bool(gap.max() <= tol * abs(S).max())
+
+
 def first_dependent(J: Array | sparse.csr_array, free: Array,
                     phi: Callable[[], Array]) -> tuple[int, float] | None:
     """The first row of J (m, N) that depends on those before it at free DOFs, or None; with its

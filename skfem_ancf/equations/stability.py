@@ -13,6 +13,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from ..core.band import Inertia, fix
 from ..core import NO_FACTORS, Array
+from .rank import is_symmetric
 
 logger = logging.getLogger(__name__)
 
@@ -124,8 +125,8 @@ def inverse_on_positions(system: Any) -> tuple[Callable[[Array], Array], Any]:
 
 def _is_symmetric(system):
     """True if the tangent of follower loads happens to be symmetric."""
-    skew, size = system.K.skew_size(system.constraints.coordinate_sizes * system.constraints.mask)
-    return skew <= ROUND_OFF * size
+    return is_symmetric(system.K.tocsc(), system.constraints.coordinate_sizes
+                        * system.constraints.mask, ROUND_OFF)
 
 
 def response(system: Any, u: Array, load: float, when: float, multipliers: Array,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..beam import (Beam, BeamPoints, Domain, by_history, displacement_strain, grade_of, kinematics,
                     remembers)
-from ..beam.strains import stress_at, stretched
+from ..beam.strains import points_of_grid, stress_at, stretched
 from ..core import (Array, CallbackError, InputError, NameUnknown, ask, first_order, refuse,
                     require_finite_scalar, require_flag, require_function, require_integer,
                     require_label, require_text, retold, shown, step, stress_of)
@@ -596,8 +596,7 @@ class DomainValues(Values):
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
     """Values at points (xi, eta) of all elements, (2, [nelements,] npoints), flattened."""
-    ne, known = beam.mesh.nelements, hasattr(state, "values_of")
+    known = hasattr(state, "values_of")
     number, s = (state.beams.index(beam), state.system.of(beam)) if known else (0, slice(beam.N))
-    part = BeamPoints(beam, number, s, None, np.repeat(np.arange(ne), X.shape[-1]),
-                      np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1))
+    part = BeamPoints(beam, number, s, None, *points_of_grid(beam.mesh.nelements, X, None)[:2])
     return state.values_of(part, recover) if known else Values(part, state.u_of(beam))

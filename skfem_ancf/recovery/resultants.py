@@ -171,11 +171,11 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
                          *_axis_of_element(beam, u, e, xi))
     else:
         # resultants of a cable from EA and EI; the shear force is the slope of the moment
-        N, M, strains = _forces_of_cable(beam, u, eigen, e, xi)
+        N, M = _forces_of_cable(beam, u, eigen, e, xi)
         near = np.clip([xi - NEAR, xi + NEAR], 0.0, 1.0)
         a, b = (_forces_of_cable(beam, u, eigen, e, x)[1] for x in near)
         J = beam.mesh.mapping().DF(_on_axis(0.5 * np.sum(near, axis=0)), e)[:, 0, :, 0]
-        angle, stretch = strains[:2]
+        angle, stretch, *_ = strains = _axis_of_element(beam, u, e, xi)
         Q = (a - b) / (np.hypot(*J) * stretch * (near[1] - near[0]))
         t = np.array([np.cos(angle), np.sin(angle)])
         values = dict(_result(N * t + Q * np.array([-t[1], t[0]]), M, *strains), N=N, Q=Q)
@@ -215,10 +215,7 @@ def _recovered(recovery, u, e, xi, after):
     segment, beam = recovery.segment_of(e, xi, after), recovery.beam
     R, M = recovery.forces.at(e, xi, recovery.forces.cuts[segment])
     if not recovery.segments:
-        if beam.has_sections:
-            return _result(R, M, *_axis_of_element(beam, u, e, xi))
-        (_, t), strain, curvature, _ = cable_axis(beam, u, e, xi)
-        return _result(R, M, angle_of(*t), 1.0 + strain, 0.0 * xi, curvature)
+        return _result(R, M, *_axis_of_element(beam, u, e, xi))
     out = np.empty((4, len(e)), R.dtype)
     s = recovery.arc.at(e, xi)
     for k in np.unique(segment):
@@ -250,15 +247,13 @@ def _across(beam, e, xi):
 
 
 def _forces_of_cable(beam, u, eigen, e, xi):
-    """Normal force and moment of a cable, and angle, stretch, shear and curvature of its axis."""
-    (_, t), strain, curvature, _ = cable_axis(beam, u, e, xi)
+    """Normal force and moment of a cable."""
     if remembers(beam) and not np.iscomplexobj(u):
-        return *cable_forces(beam, u, e, xi), (
-            angle_of(*t), 1.0 + strain, 0.0 * xi, curvature)
+        return cable_forces(beam, u, e, xi)
+    _, strain, curvature, _ = cable_axis(beam, u, e, xi)
     EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
     N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
-    return (EA * strain - ES * curvature - N0, EI * curvature - ES * strain - M0,
-            (angle_of(*t), 1.0 + strain, 0.0 * xi, curvature))
+    return EA * strain - ES * curvature - N0, EI * curvature - ES * strain - M0
 
 
 def _eigen_forces_of_cable(beam, eigen, e, xi):
@@ -270,6 +265,9 @@ def _eigen_forces_of_cable(beam, eigen, e, xi):
 
 def _axis_of_element(beam, u, e, xi):
     """Angle, stretch, shear and change of curvature of the element's kinematics."""
+    if not beam.has_sections:
+        (_, t), strain, curvature, _ = cable_axis(beam, u, e, xi)
+        return angle_of(*t), 1.0 + strain, 0.0 * xi, curvature
     eta, w = gauss(beam.element.order + 2)
     lever = 12.0 * (eta - 0.5) * w
     sections, axis = Sections(beam, e, xi, eta), Sections(beam, e, xi)

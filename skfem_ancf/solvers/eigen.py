@@ -10,7 +10,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 from ..core.band import fix
 from ..core import (NO_FACTORS, Array, ConvergenceError, InputError, ModelWarning, SupportError,
                     refuse, require_integer, retold, warn)
-from ..equations.matrices import Inverse, StrainTangent, is_symmetric
+from ..equations.matrices import Inverse, StrainTangent
+from ..equations.rank import is_symmetric
 from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes
 from ..results.state import State
