@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -117,7 +117,9 @@ class Integrator:
             self._nodes = Condensed(system, A), CondensedMass(system)
         unsymmetric = scheme.conserving and self._nodes is None
         U = BandMatrix.zeros(system.N if unsymmetric else 0, system.bandwidth, symmetric=False)
-        self._couplings = [_coupled(X, system) for X in (A, U) if system.forces.changing]
+        # force elements that couple DOFs anywhere
+        self._couplings = [Coupling(X, partial(_couplings, system)) for X in (A, U)
+                           if system.forces.changing]
         A, U = [one.band for one in self._couplings] or (A, U)
         self._matrices = Matrices(M, system.mass_solver.factors, A, U, *_damping(system))
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
@@ -468,16 +470,10 @@ class Integrator:
                 "carried": work.stresses[3], "rates": work.stresses[5], **beside}
 
 
-def _coupled(A, system):
-    """The :class:`Coupling` of a band matrix with force elements that couple DOFs anywhere."""
-    free = system.constraints.free
-
-    def entries():
-        i, j, values = system.forces.kept
-        kept = free[i] & free[j]
-        return i[kept], j[kept], values[kept]
-
-    return Coupling(A, entries)
+def _couplings(system):
+    i, j, values = system.forces.kept
+    kept = system.constraints.free[i] & system.constraints.free[j]
+    return i[kept], j[kept], values[kept]
 
 
 def _damping(system):

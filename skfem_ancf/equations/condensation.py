@@ -126,7 +126,8 @@ class Condensed:
         self.at = u.copy(), multipliers.copy()
         K = self._K if self._K.symmetric else self._K.symmetric_part()
         turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
-        scales = self._moves.following_scales(turns)
+        follow = self.nodes.turned  # ends that follow a rotation, and scales of their equations
+        scales = (np.conj(turns[follow]) * turns[self.nodes.leader[follow]]).real
         moments = self._moments(multipliers, scales)
         S, self._parts, self._nodes = np.empty((len(hinged), 6, 6)), [], None  # no two at once
         for group, bases in zip(self.groups, self._bases):
@@ -281,7 +282,6 @@ class _Moves:
     """Displacements of ends relative to their nodes, by residuals of the joint equations."""
 
     def __init__(self, nodes: Nodes) -> None:
-        self._turned, self._leading = nodes.turned, nodes.leader[nodes.turned]
         follow = (nodes.followers, nodes.followers, nodes.turned)
         rows = [3 * ends + k for k, ends in enumerate(follow)]
         self._following = first = sum(map(len, follow))
@@ -296,10 +296,6 @@ class _Moves:
         self._prescribed = nodes.leader[ends]
         self._at = np.concatenate(rows), np.concatenate(columns)
         self._shape = 3 * len(nodes.nodes), first
-
-    def following_scales(self, turns: Array) -> Array:
-        """Scales of the equations of ends that follow a rotation, from the turns (ends,) of all."""
-        return (np.conj(turns[self._turned]) * turns[self._leading]).real
 
     def __call__(self, turns: Array, scales: Array) -> sparse.csr_array:
         """Matrix from residuals (m,) to end displacements (3 ends,)."""

@@ -513,13 +513,11 @@ class MeshBeam(NumberedMesh):
         require_unmasked("elements", elements)
         elements = np.unique(self.normalize_elements(elements))
         refuse(not len(elements), "a mesh needs at least one element, got none", error=MeshError)
-        nodes = np.unique(self.t[:, elements])
-        renumber = np.full(self.p.shape[1], -1, dtype=np.int32)
-        renumber[nodes] = np.arange(len(nodes))
+        nodes, t = np.unique(self.t[:, elements], return_inverse=True)
         kept = {**dict.fromkeys(NODAL, nodes), "lengths": elements, "heights": elements}
         changes: dict[str, Any] = {name: getattr(self, name)[..., some] for name, some
                                    in kept.items() if getattr(self, name) is not None}
-        changes.update(t=renumber[self.t[:, elements]], _boundaries=None, _subdomains=None)
+        changes.update(t=t.reshape(2, -1).astype(np.int32), _boundaries=None, _subdomains=None)
         m = replace(self, **changes)
         if self._subdomains is not None and not skip_subdomains:
             m._subdomains = {name: np.nonzero(np.isin(elements, e))[0].astype(np.int32)
