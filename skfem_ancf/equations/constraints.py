@@ -412,9 +412,7 @@ class Constraints:
                 if selected[columns].all():
                     np.subtract.at(force, columns, values * part[rows])
                     touched[columns] = True
-                    J = np.zeros((len(part), self.N))
-                    np.add.at(J, (rows, columns), values)
-                    found.append(J)
+                    found.append(joint.jacobian(zero, 0.0))
         at = np.flatnonzero(touched & self.free)
         if len(at):
             J, sizes = np.concatenate(found)[:, at], self.coordinate_sizes[at]

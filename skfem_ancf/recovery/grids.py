@@ -180,10 +180,10 @@ def body_of(grid: Grid, fields: Sequence[Field], undeformed: bool = False, lenie
         values = values.reshape(len(points), -1)
         size = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
         one &= np.all(np.isclose(values[a], values[b], 0.0, ROUND_OFF * size, True), axis=1)
-    number, unique = np.arange(len(points)), np.ones(len(points), dtype=bool)
-    number[b[one]], unique[b[one]] = a[one], False
-    new = np.cumsum(unique) - 1
-    return Body(points[unique], new[number[cells]], {name: x[unique] for name, x in data.items()})
+    number = np.arange(len(points))
+    number[b[one]] = a[one]
+    kept, new = np.unique(number, return_inverse=True)
+    return Body(points[kept], new[cells], {name: x[kept] for name, x in data.items()})
 
 
 def _array(field, grid, lenient):
