@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from ..actions.contact.tables import is_clear
+from ..actions.forces.kernels import rests
 from ..core.band import (SMALL, Band, BandMatrix, Inertia, dense, factorize, fix,
                          solve_dependent)
 from ..core import Array, cached_property, handle_of, refuse
@@ -123,7 +123,7 @@ class LinearSolver:
             return
         if u is not None:
             self.assembled_at(u, t)
-        if self.at_times and is_clear(s.forces.clear, self._at[0], 0.0):
+        if self.at_times and rests(s.forces, self._at[0], 0.0):
             s.K.factorize()
             self.keep_band()
             return

@@ -7,8 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..actions.contact.tables import is_clear
-from ..actions.forces.kernels import nothing_touches
+from ..actions.forces.kernels import nothing_touches, rests
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
 from ..core import F1, MADE, Array, apart, call_solver, indices, source
@@ -191,7 +190,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if moving:
             _move(e, target, g, moved, u, R, phi)
         if by_band:
-            if e.forces.changing > 0 and not clear and not is_clear(e.forces.clear, u, 0.0):
+            if e.forces.changing > 0 and not clear and not rests(e.forces, u, 0.0):
                 return INDEFINITE, k + 1, k, False, UNSEEN
             if solve_definite(e.K, e.factors, e.fixed, R, du) == 0:
                 return INDEFINITE, k + 1, k, False, UNSEEN

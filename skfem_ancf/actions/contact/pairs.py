@@ -19,6 +19,7 @@ from ...core import (C1, C2, C3, F1, F2, I1, I2, MADE, apart, everywhere, indice
 from ...core.band import copy, dot as inner, farthest, largest, smallest
 from ...core.callbacks import SEARCHES, call_custom, owner
 from ..tables import least_each
+from .stretches import Cut, Rows, straight
 from .points import (Touch, add_bend, add_coupling, add_resistance, by_slope, cross, dot,
                      mean_pressure, product, put, respond, return_mapping, scaled, size, spread,
                      turned, vector)
@@ -51,6 +52,7 @@ class Candidates(NamedTuple):
     e: I1
     zeta: F1
     group: I1  # numbers of pairs of a point and a chain
+    cut: Cut  # none of these are in one stretch
 
 
 class Facing(NamedTuple):
@@ -97,10 +99,11 @@ class PairTables(NamedTuple):
     width: float  # of the transition from no pressure to proportional pressure
     friction: float
     handle: int  # of the search
-    found: I1  # address of the Candidates
+    found: I1  # address of the Candidates, and the number of searches, (2,)
     seen: C1  # displacements at the last search, (n,)
     moves: F2  # their weights, see :func:`~skfem_ancf.actions.contact.tables.weights_of_motion`
     skin: F1  # the candidates are complete until points or facets have moved by half of it, (1,)
+    rows: Rows  # and while stretches of the beams are straight
     start: Facing  # at the start of the last step, with the displacements there
     start_at: C1
     history: F1  # factor on the stiffness, less 1; with friction curves and anchors of points
@@ -199,7 +202,7 @@ def look(t, z, found):
         found.e[p], found.zeta[p], found.gap[p] = -1, 0.0, 0.0
     u, none = z.view(np.float64), t.sides[:0]
     travel = farthest(t.moves, u, t.seen.view(np.float64))
-    if not travel < 0.5 * t.skin[0]:
+    if not travel < 0.5 * t.skin[0] or not straight(t.rows, candidates_of(t).cut, z):
         call_custom(SEARCHES, t.handle, np.int64(0), 0.0, 0.0, u, none, none)
         travel = 0.0
     known = candidates_of(t)

@@ -116,9 +116,9 @@ def pair_of(tables, k):
 
 #: How far points may move from displacements at which nothing touches; 1 if the tangent of the last
 #: step has entries of contact; how far anchors of friction follow points; number of steps on whose
-#: way something may touch; from SEEN on the displacements (N,), then weights of pairs of DOFs
-#: (2, N / 2), see :func:`weights_of_motion`.
-MARGIN, HAS_ENTRIES, FOLLOWED, PASSED, SEEN = range(5)
+#: way something may touch; number of searches of members until then; from SEEN on the displacements
+#: (N,), then weights of pairs of DOFs (2, N / 2), see :func:`weights_of_motion`.
+MARGIN, HAS_ENTRIES, FOLLOWED, PASSED, SEARCHED, SEEN = range(6)
 #: Part of a gap that is the margin; half of it if two surfaces may approach each other.
 SAFE = 0.9
 
@@ -152,7 +152,7 @@ def set_clear(clear, u, margin):
 
 def clear_table(weights: np.ndarray, followed: float = 0.0) -> np.ndarray:
     """A table without a margin."""
-    return np.concatenate([[0.0, 0.0, followed, 0.0], 0.0 * weights.ravel(), weights.ravel()])
+    return np.concatenate([[0.0, 0.0, followed, 0.0, 0.0], 0.0 * weights.ravel(), weights.ravel()])
 
 
 def weights_of_motion(weights: np.ndarray, dofs: np.ndarray, n: int,

@@ -14,9 +14,10 @@ from ...core.callbacks import ELEMENTS, POSES, call_custom
 from ...core import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_each, add_products
 from ..contact.kernels import FAR, of_contacts, untouched
-from ..contact.pairs import pair_accept, pair_force, pair_tables
+from ..contact.pairs import candidates_of, pair_accept, pair_force, pair_tables
+from ..contact.stretches import straight
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, PASSED, RATE,
-                              SAFE, SETTLE, TANGENT, TURNS, ContactTables, Request,
+                              SAFE, SEARCHED, SETTLE, TANGENT, TURNS, ContactTables, Request,
                               RESISTING as RUBBING, is_clear, left_of, set_clear)
 
 #: Kinds of elements.
@@ -149,7 +150,23 @@ def _add_force(tables, what, t, span, u, v, start, f):
 @source
 def at_rest(tables, u0, u1):
     """True if no changing element does anything at both displacements."""
-    return is_clear(tables.clear, u0, 0.0) and is_clear(tables.clear, u1, 0.0)
+    return rests(tables, u0, 0.0) and rests(tables, u1, 0.0)
+
+
+@source
+def rests(tables, u, less):
+    """True if it is known that no changing element does anything at u, with a margin that is
+    smaller by ``less``."""
+    if not is_clear(tables.clear, u, less):
+        return False
+    searches = 0.0
+    for k in range(tables.paired):
+        pair = pair_tables(tables, k)
+        searches += pair.found[1]
+        if pair.rows.starts.size > 0 and not straight(
+                pair.rows, candidates_of(pair).cut, _used(pair, u)):
+            return False
+    return searches == tables.clear[SEARCHED]  # the margin is that of pairs not in one stretch
 
 
 @source
@@ -168,11 +185,13 @@ def _add_pairs(tables, span, u0, u1, f):
     """Add the mean force of members that touch each other."""
     found, total = np.empty(1), f.view(np.complex128)
     least = FAR if tables.changing == tables.paired else 0.0  # of others no gap is known
+    tables.clear[SEARCHED] = 0.0
     for k in range(tables.paired):
         pair = pair_tables(tables, k)
         out = np.zeros(pair.used.size, np.complex128)
         pair_force(pair, _used(pair, u0), _used(pair, u1), span == 0.0, out, found)
         least = min(least, found[0])
+        tables.clear[SEARCHED] += pair.found[1]
         add_each(total, pair.used, out)
     set_clear(tables.clear, u1, 0.5 * SAFE * least)
 
@@ -231,7 +250,7 @@ def add_friction_tangent(tables, t, factor, u, v, A):
 def nothing_touches(tables, u):
     """True if it is known that no obstacle touches at u, and that changing elements do nothing."""
     return (tables.contacts.number == 0 or untouched(tables.contacts, FORCE, u)) and (
-        tables.changing == 0 or is_clear(tables.clear, u, 0.0))
+        tables.changing == 0 or rests(tables, u, 0.0))
 
 
 @source
@@ -253,7 +272,7 @@ def way_is_clear(tables, t, u, du, f):
     contact_work(tables, t, ahead, du, f)
     return nothing_touches(tables, ahead) and (
         tables.contacts.number == 0 or is_clear(tables.contacts.clear, u, -by_obstacles)) and (
-        tables.changing == 0 or is_clear(tables.clear, u, -by_members))
+        tables.changing == 0 or rests(tables, u, -by_members))
 
 
 @source

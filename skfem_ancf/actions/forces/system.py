@@ -11,14 +11,14 @@ from scipy import sparse
 
 from ...core import Array, constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
-from ..contact.tables import HAS_ENTRIES, SAFE, SEEN, clear_table, is_clear, set_clear
+from ..contact.tables import HAS_ENTRIES, SAFE, SEARCHED, SEEN, clear_table, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
 from .springs import TorsionalSpring
 from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
                       RESISTING, SETTLED, TORSION, TURNED, ForceTables, element_stiffness, kinds_of,
-                      of_kinds, potential, vectors_of)
+                      of_kinds, potential, rests, vectors_of)
 
 
 #: Relative size of forces of an item that are round-off.
@@ -37,7 +37,7 @@ class Forces:
     with places that differ by more than 1; ``distant`` if one always does. ``symmetric``: all
     derivatives are symmetric. ``resists``: there are velocity-dependent forces. ``masses``
     contribute to the mass matrix; ``contacts`` are the obstacles. ``clear`` is a table of
-    :func:`~skfem_ancf.actions.contact.tables.is_clear` of the ``changing`` ones.
+    :func:`~skfem_ancf.actions.forces.kernels.rests`.
     """
 
     #: The vectors are ``start + B u``: the start, and the rows, DOFs and weights of B.
@@ -54,7 +54,7 @@ class Forces:
     masses: Any = ()
     elements = custom = changing = remembering = parts = _springs = _blocks = _slices = masses
     _paired: Any = masses
-    rows = size = 0
+    rows = size = paired = 0
     distant = couples_far = resists = False
     symmetric = True
     contacts = Contacts((), 0)
@@ -106,6 +106,7 @@ class Forces:
         self.clear, u = clear_table(weights), np.zeros(N)
         if self.changing:
             set_clear(self.clear, u, 0.5 * SAFE * self._least_gap(u))
+            self.clear[SEARCHED] = sum(pair.found[1] for pair in self.pairs)
         self.distant = bool(self._in_border.any())
         self.couples_far = self.distant or bool(self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
@@ -145,6 +146,7 @@ class Forces:
         self.pairs: Any = tuple(
             search.tables._replace(used=at[::2] // 2, history=e.values)
             for search, (e, at) in zip(self._searches, self._paired)) or NONE
+        self.paired = len(self.pairs)
 
     def _couple(self, blocks, places):
         """Find the vectors, ``start + B u``, and the entries of all derivatives by two of them."""
@@ -207,7 +209,7 @@ class Forces:
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._border[0], self._border[1],
             handle if self.custom or self.changing else 0, self.contacts.tables,
-            len(self.changing), self.clear, len(self.pairs), self.pairs)
+            len(self.changing), self.clear, self.paired, self.pairs)
 
     def acting_rows(self, u: Array, t: float) -> tuple[Array, Array]:
         """Derivatives of positions of concentrated elements, and forces of items, (k, N) each."""
@@ -355,7 +357,7 @@ class Forces:
 
     def _at_rest(self, *displacements: Array) -> bool:
         """True if it is known that they do nothing at displacements (N,)."""
-        return all(is_clear(self.clear, u, 0.0) for u in displacements)
+        return all(rests(self, u, 0.0) for u in displacements)
 
     def changing_entries(self, t: float, u0: Array, u1: Array, v: Array | None = None,
                          factor: float = 0.0) -> tuple[Array, Array, Array]:

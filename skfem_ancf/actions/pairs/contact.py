@@ -119,9 +119,9 @@ class BodyContact(ForceElement):
         beams = [k for k in used if isinstance(layout.members[k], Beam)]
         origin = complex(*np.mean([layout.members[k].origin for k in used], axis=0))
         f = _widened(facets_of(layout, used, origin), beams)
-        f = rounded(f, ROUND * float(np.min(f.heights)))
         self.dofs = np.unique(f.dofs)
-        f = f._replace(dofs=np.searchsorted(self.dofs, f.dofs))
+        sharp = f._replace(dofs=np.searchsorted(self.dofs, f.dofs))
+        f = rounded(sharp, ROUND * float(np.min(f.heights)))
         surfaces = Surfaces(f)
         if not np.isfinite(f.stiffness).any() and self.penalty is None:
             raise InputError(f"{self!r} has no beam, whose modulus would give a stiffness: give "
@@ -129,7 +129,7 @@ class BodyContact(ForceElement):
         solids = [(k, _inside(layout.members[k], origin)) for k in used if k not in beams]
         places = np.isin(self.dofs, np.concatenate([layout.offset(k) // 2 + np.flatnonzero(
             layout.members[k].rigid_motions()[::2, 0]) for k in used]))
-        self.broad_search = Search(surfaces, allowed, solids,
+        self.broad_search = Search(surfaces, sharp, allowed, solids,
                                    (self.penalty, WIDTH, self.friction), places)
         self._surfaces, self.origin = surfaces, origin
         self.weights = self.broad_search.weights

@@ -15,15 +15,17 @@ from ..contact.pairs import APART, EDGE, ON, Candidates, PairTables, facing, tog
 from ..contact.points import cross, dot
 from ..contact.tables import weights_of_motion
 from .facets import Facets
+from .stretches import NOTHING, Stretches
 
 #: Distance of seeds along facets, largest number on a facet, and the distance for which a list of
-#: candidates is enough, in heights; larger ones tried where nothing is near.
+#: candidates is enough, in heights; larger ones tried where nothing is near, and the largest.
 SEEDS, MOST, SKIN = 1.2, 10, 0.5
-SKINS = 2.0, 5.0, 12.0, 30.0, 75.0
+SKINS, FARTHEST = (2.0, 5.0, 12.0, 30.0, 75.0), 1e6
 #: Distance of axes that are joined, in heights; parts of an element in which they are searched.
 JOINED, FINE = 1e-3, 8
 #: No candidates.
-NOBODY = Candidates(*(np.zeros(0, kind) for kind in (np.int64, np.int64, float, np.int64)))
+NOBODY = Candidates(*(np.zeros(0, kind) for kind in (np.int64, np.int64, float, np.int64)),
+                    NOTHING)
 #: Sine of the angle of parallel segments.
 PARALLEL = 1e-6
 #: How much further points between those of a rule may move.
@@ -74,13 +76,13 @@ class Surfaces:
 class Search:
     """Finds the facet that each point is nearest to.
 
-    ``allowed`` (M, M) says which members may touch; ``solids`` are numbers of members without axes,
-    and functions that say which places of the reference configuration are inside; ``numbers`` are
-    stiffness or None, width of the transition in heights, and coefficient of friction. ``tables``
-    are those for kernels.
+    ``sharp`` are facets before corners are rounded. ``allowed`` (M, M) says which members may touch;
+    ``solids`` are numbers of members without axes, and functions that say which places of the
+    reference configuration are inside; ``numbers`` are stiffness or None, width of the transition in
+    heights, and coefficient of friction. ``tables`` are those for kernels.
     """
 
-    def __init__(self, surfaces: Surfaces, allowed: Array, solids: Sequence[Any],
+    def __init__(self, surfaces: Surfaces, sharp: Facets, allowed: Array, solids: Sequence[Any],
                  numbers: tuple[float | None, float, float], places: Array) -> None:
         self.surfaces, self.allowed = surfaces, allowed
         f, ((N, _), (D, slope)) = surfaces.facets, surfaces.points
@@ -93,6 +95,7 @@ class Search:
         self._seed_zeta = (2.0 * np.arange(m) + 1.0) / m - 1.0
         self._near = 0.6 * f.lengths / m + f.offsets
         self.joined = self._joined(solids)
+        self._stretches = Stretches(sharp, np.diag(allowed), f)
         penalty, width, friction = numbers
         of_facets = {name: _packed(getattr(f, name), kind) for kind, names in (
             (float, "sides offsets places lengths spans heights stiffness zeta areas"),
@@ -108,16 +111,17 @@ class Search:
             joined=_packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
             point_dofs=_packed(surfaces.dofs.T, np.int64), N=_packed(N.T, complex),
             D=_packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
-            found=np.zeros(1, np.int64), seen=np.zeros(n, complex), moves=self.weights,
-            skin=np.zeros(1), start=facing(0, 0, 0), start_at=np.zeros(0, complex),
+            found=np.zeros(2, np.int64), seen=np.zeros(n, complex), moves=self.weights,
+            skin=np.zeros(1), rows=self._stretches.rows, start=facing(0, 0, 0), start_at=np.zeros(0, complex),
             history=np.zeros(1), **of_facets)
         self.fresh(False)
+        self.search(np.zeros(n, complex))
 
     def fresh(self, other: bool = True) -> Search:
-        """Forget what was found, or make a copy that has found nothing."""
+        """Search anew, or make a copy that does so."""
         one, t, n = copy(self) if other else self, self.tables, len(self.tables.seen)
         one.tables = t._replace(
-            handle=handle_of(one), found=np.zeros(1, np.int64), seen=np.zeros(n, complex),
+            handle=handle_of(one), found=t.found.copy(), seen=np.zeros(n, complex),
             skin=np.zeros(1), start=facing(t.starts.shape[0], t.starts.shape[1], len(t.of)),
             start_at=np.full(n, np.nan + 0j))
         return one
@@ -127,6 +131,7 @@ class Search:
         x, f, m = self.surfaces.outside(z)[0], self.surfaces.facets, len(self._seed_zeta)
         e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(self._seed_zeta, len(f.sides))
         y = self.surfaces.along(e, zeta, 0, z)
+        cut = self._group(z)
         room = self._room(x, y, e) / self.height
         known, skin = NOBODY, room
         if not room > SKIN:
@@ -136,18 +141,34 @@ class Search:
                 if len(wide.p):
                     break
                 known, skin = wide, wider
-        t, self.candidates, self._words = self.tables, known, Packed(known)
-        t.found[0], t.skin[0], t.seen[:] = self._words.address, skin * self.height, z
+        t, self.candidates = self.tables, known._replace(cut=cut)
+        self._words = Packed(self.candidates)
+        t.found[:] = self._words.address, t.found[1] + 1
+        t.skin[0], t.seen[:] = skin * self.height, z
+
+    def _group(self, z):
+        """Set groups of facets, which are members and parts of beams, and which of them may touch.
+        Returns the Cut."""
+        f, (cut, part, fits) = self.surfaces.facets, self._stretches.cut(z)
+        k, n = np.flatnonzero(fits), len(fits) + 1
+        self._groups = np.where(part < 0, n + f.members, part)
+        members = np.zeros(n + len(self.allowed), np.int64)
+        members[self._groups] = f.members
+        self._may = self.allowed[np.ix_(members, members)]
+        for i in (k, k + 1):
+            self._may[i, k] = self._may[i, k + 1] = False
+        return cut
 
     def _room(self, x, y, e):
-        """The largest skin within which boxes around members say that there is nothing."""
-        f, boxes = self.surfaces.facets, np.full((2, 4, len(self.allowed)), -np.inf)
-        for box, at, members in zip(boxes, (x, y), (f.members[f.of], f.members[e])):
+        """The largest skin within which boxes around groups say that there is nothing."""
+        f, boxes = self.surfaces.facets, np.full((2, 4, len(self._may)), -np.inf)
+        for box, at, groups in zip(boxes, (x, y), (self._groups[f.of], self._groups[e])):
             for most, values in zip(box, (at.real, at.imag, -at.real, -at.imag)):
-                np.maximum.at(most, members, values)
+                np.maximum.at(most, groups, values)
         a, b = boxes[0][:, :, None], boxes[1][:, None]
         away = np.maximum(0.0, np.maximum(-a[2:] - b[:2], -b[2:] - a[:2]))
-        return np.min(np.hypot(*away)[self.allowed]) - np.max(self._near) - self.height
+        return np.min(np.hypot(*away)[self._may], initial=FARTHEST * self.height) - np.max(
+            self._near) - self.height
 
     def _search(self, x, y, e, zeta, skin):
         f = self.surfaces.facets
@@ -155,8 +176,8 @@ class Search:
         reach = float(np.max(self._near)) + self.height + skin
         found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
         p, k, far = found["i"], found["j"], found["v"]
-        which = (far < self._near[e[k]] + self.height + skin) & self.allowed[
-            f.members[f.of[p]], f.members[e[k]]] & ~together(
+        which = (far < self._near[e[k]] + self.height + skin) & self._may[
+            self._groups[f.of[p]], self._groups[e[k]]] & ~together(
             self.tables, p, e[k], zeta[k], 1.0)
         p, k, far = p[which], k[which], far[which]
         order = np.lexsort((far, e[k], p))
@@ -166,7 +187,7 @@ class Search:
         chain = f.chains[e[k]]
         group = np.unique(p * (1 + np.max(chain, initial=0)) + chain, return_inverse=True)[1]
         return Candidates(*(_packed(x, y) for x, y in (
-            (p, np.int64), (e[k], np.int64), (zeta[k], float), (group.ravel(), np.int64))))
+            (p, np.int64), (e[k], np.int64), (zeta[k], float), (group.ravel(), np.int64))), NOTHING)
 
     # parts that are one body
 

@@ -1,0 +1,95 @@
+"""Beams that may touch themselves, cut into stretches that cannot, see
+:mod:`skfem_ancf.actions.contact.stretches`."""
+
+from __future__ import annotations
+
+from math import comb
+from typing import Any
+
+import numpy as np
+
+from ...core import Array, gauss_lobatto
+from ..contact.stretches import ALONG, Cut, Rows, progress
+from .facets import Facets
+
+#: Largest change of direction in a part of a beam, of which a stretch has two; directions that are
+#: as near to each other count as equal.
+TURN, EQUAL = 0.7, 0.2
+
+
+class Stretches:
+    """Vectors of beams, from their facets before corners are rounded; ``touch`` (M,) says which
+    members may touch themselves. All ``facets`` have an element of these, or -1."""
+
+    def __init__(self, f: Facets, touch: Array, facets: Facets) -> None:
+        self.of, self.rows, self._chains = np.full(len(facets.sides), -1), NO_ROWS, f.chains[:0]
+        if not touch.any():
+            return
+        n, own = f.starts.shape[1], touch[f.members]
+        bottom, top = (np.flatnonzero(own & (f.spans > 0.0) & (f.sides == side))
+                       for side in (-1, 1))
+        self._chains, far = f.chains[bottom], 1.0 + np.max(f.places + f.spans)
+        places = self._chains * far + f.places[bottom]
+        self.of, at = (np.where(touch[g.members], np.searchsorted(
+            places, g.chains * far + g.places + 0.5 * g.spans, "right") - 1, -1)
+            for g in (facets, f))
+        # control points of polynomials and of their slopes, (n, F, B + 1)
+        C = np.concatenate([f.weights, f.starts[:, None]], axis=1)
+        points = _controls(n, C)
+        slopes = _controls(n - 1, C[..., 1:] * np.arange(1.0, n))
+        self._each, deep = n - 1, f.offsets == 0.0
+        parts: list[Any] = []
+        for e in (bottom, top[deep[top]]):
+            parts.append((slopes[:, e], e, 0.5 * ALONG * f.spans[e]))
+        parts.append((points[:, top] - points[:, bottom], bottom, -f.heights[bottom]))
+        ends = np.flatnonzero(own & (f.spans == 0.0))
+        for side in (bottom, top):
+            e = side[at[ends]]
+            corner = np.where((f.places[ends] > f.places[e])[:, None], points[-1, e], points[0, e])
+            parts.append((points[:, ends] - corner, e, f.offsets[e] - f.heights[e]))
+        # those of an element one after another
+        x, e, least = (np.concatenate(y) for y in zip(*(
+            (x.transpose(1, 0, 2).reshape(-1, C.shape[1]), np.repeat(e, len(x)),
+             np.repeat(least, len(x))) for x, e, least in parts)))
+        self._elements = at[e]
+        self.rows = Rows(*(np.ascontiguousarray(y, kind) for y, kind in (
+            (f.dofs[e].T, np.int64), (x[:, :-1].T, complex), (x[:, -1], complex), (least, float))))
+
+    def cut(self, z: Array) -> tuple[Cut, Array, Array]:
+        """The Cut at displacements z; of facets their part or -1, and which stretches are straight,
+        of which number k has the parts k and k + 1."""
+        E, rows, each = len(self._chains), self.rows, self._each
+        if not E:
+            return NOTHING, self.of, np.zeros(1, bool)
+        w, dofs = rows.weights[:, :E * each], rows.dofs[:, :E * each]
+        t = (rows.starts[:E * each] + np.sum(w * z[dofs], axis=0)).reshape(E, each).sum(axis=1)
+        angles = np.cumsum(np.append(0.0, np.angle(t[1:] * np.conj(t[:-1]))))
+        part, k, low, high = np.ones(E, np.int64), 1, angles[0], angles[0]
+        for e in range(1, E):
+            low, high = min(low, angles[e]), max(high, angles[e])
+            if self._chains[e] != self._chains[e - 1] or high - low > TURN:
+                k, low, high = k + 1 + (self._chains[e] != self._chains[e - 1]), angles[e], angles[e]
+            part[e] = k
+        ends, level = np.zeros((2, k + 1), np.int64), np.round(angles / EQUAL)
+        for s in range(k + 1):
+            own = np.flatnonzero((part == s) | (part == s + 1))
+            if len(own):
+                low, high = np.argmin(level[own]), len(own) - 1 - np.argmax(level[own][::-1])
+                ends[:, s] = own[[low, high]] * each + each // 2
+        of = np.array([part - 1, part])[:, self._elements]
+        fits = np.ones(k + 1, bool)
+        fits[of[~(progress(rows, Cut(of, ends), z) > 0.0)]] = False
+        return Cut(np.ascontiguousarray(np.where(fits[of], of, -1)), ends), np.where(self.of < 0, -1, part[self.of]), fits
+
+
+#: Of members that cannot touch themselves.
+NOTHING = Cut(*np.zeros((2, 2, 0), np.int64))
+NO_ROWS = Rows(NOTHING.of, np.zeros((2, 0), complex), np.zeros(0, complex), np.zeros(0))
+
+
+def _controls(n, C):
+    """Control points of polynomials with n coefficients (..., n) on [-1, 1], (n, ...)."""
+    x = gauss_lobatto(n)
+    rise = 0.5 + 0.5 * x
+    basis = np.array([comb(n - 1, k) * rise**k * (1.0 - rise) ** (n - 1 - k) for k in range(n)]).T
+    return np.moveaxis(C @ np.linalg.solve(basis, np.vander(x, n, increasing=True)).T, -1, 0)
