@@ -19,6 +19,8 @@ from skfem_ancf.actions.contact import contacts, kernels, pairs
 from skfem_ancf.actions.contact.tables import is_clear
 from skfem_ancf.actions.forces import kernels as pair_forces, system as forces_of_scene
 from skfem_ancf.actions.obstacles import Circle, Line
+from skfem_ancf.actions.pairs import search
+from skfem_ancf.actions.pairs.stretches import Stretches
 from skfem_ancf.beam.layout import Layout
 from skfem_ancf.scene.quasistatic import drag_of
 
@@ -488,6 +490,39 @@ def test_contact_is_that_of_a_search_in_each_evaluation(monkeypatch, friction):
         monkeypatch.setattr(module, "SAFE", 0.0)
     for a, b in zip(found, solved()[0]):
         assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+def test_a_beam_that_turns_and_folds_finds_itself(monkeypatch, element):
+    """Stretches that are hardly bent are no candidates, however far they move; none is missed."""
+    h, n = 0.01, 24
+    s = np.linspace(0.0, 1.0, 20 * n + 1)
+
+    def shape(share):  # a hairpin whose legs meet at their ends, turned two and a half times
+        turn = 5.0 * np.pi * share + 1.1 * np.pi * share * np.clip((s - 0.4) / 0.2, 0.0, 1.0)
+        t = np.exp(1j * turn)
+        r = np.append(0.0, np.cumsum(0.5 * (t[1:] + t[:-1]) * np.diff(s)))
+        return r[::20], t[::20]
+
+    def bound():
+        layout = Layout(line(1.0, n, h, element=element))
+        return recalled(BodyContact(self_contact=True).bound_on(layout)[0])
+
+    contact, straight = bound(), shape(0.0)
+    each = len(contact.dofs) // (n + 1)
+    monkeypatch.setattr(search, "Stretches", lambda f, touch, facets: Stretches(
+        f, np.zeros_like(touch), facets))
+    plain, found = bound(), []
+    for share in np.linspace(0.0, 1.0, 30):
+        r, t = (a - b for a, b in zip(shape(share), straight))
+        z = np.column_stack([r, t] + [1j * t] * (each - 2))
+        x = np.column_stack([z.real.ravel(), z.imag.ravel()])
+        f = contact.force(x, 0.0 * x, 0.0)
+        assert_allclose(f, plain.force(x, 0.0 * x, 0.0), rtol=1e-9, atol=1e-9 * np.abs(f).max())
+        assert contact.least_gap(x) <= 0.0 or not f.any()
+        found.append((contact.least_gap(x) > 10.0 * h, f.any()))
+    unbent, touches = np.array(found).T
+    assert unbent[:10].all() and not touches[:20].any() and touches[-1]
 
 
 def test_what_does_not_touch_is_seldom_looked_at(monkeypatch):

@@ -24,8 +24,8 @@ SKINS, FARTHEST = (2.0, 5.0, 12.0, 30.0, 75.0), 1e6
 #: Distance of axes that are joined, in heights; parts of an element in which they are searched.
 JOINED, FINE = 1e-3, 8
 #: No candidates.
-NOBODY = Candidates(*(np.zeros(0, kind) for kind in (np.int64, np.int64, float, np.int64)),
-                    NOTHING)
+_NONE = np.zeros(0, np.int64)
+NOBODY = Candidates(_NONE, _NONE, np.zeros(0), _NONE, NOTHING)
 #: Sine of the angle of parallel segments.
 PARALLEL = 1e-6
 #: How much further points between those of a rule may move.
@@ -76,10 +76,10 @@ class Surfaces:
 class Search:
     """Finds the facet that each point is nearest to.
 
-    ``sharp`` are facets before corners are rounded. ``allowed`` (M, M) says which members may touch;
-    ``solids`` are numbers of members without axes, and functions that say which places of the
-    reference configuration are inside; ``numbers`` are stiffness or None, width of the transition in
-    heights, and coefficient of friction. ``tables`` are those for kernels.
+    ``sharp`` are facets before corners are rounded; ``allowed`` (M, M) says which members may
+    touch; ``solids`` are numbers of members without axes, and functions that say which places of
+    the reference configuration are inside; ``numbers`` are stiffness or None, width of the
+    transition in heights, and coefficient of friction. ``tables`` are those for kernels.
     """
 
     def __init__(self, surfaces: Surfaces, sharp: Facets, allowed: Array, solids: Sequence[Any],
@@ -112,8 +112,8 @@ class Search:
             point_dofs=_packed(surfaces.dofs.T, np.int64), N=_packed(N.T, complex),
             D=_packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
             found=np.zeros(2, np.int64), seen=np.zeros(n, complex), moves=self.weights,
-            skin=np.zeros(1), rows=self._stretches.rows, start=facing(0, 0, 0), start_at=np.zeros(0, complex),
-            history=np.zeros(1), **of_facets)
+            skin=np.zeros(1), rows=self._stretches.rows, start=facing(0, 0, 0),
+            start_at=np.zeros(0, complex), history=np.zeros(1), **of_facets)
         self.fresh(False)
         self.search(np.zeros(n, complex))
 

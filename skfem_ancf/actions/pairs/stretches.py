@@ -15,6 +15,10 @@ from .facets import Facets
 #: Largest change of direction in a part of a beam, of which a stretch has two; directions that are
 #: as near to each other count as equal.
 TURN, EQUAL = 0.7, 0.2
+#: Sections extend along d by no more than the height, or ends of cables by this part of it, times
+#: the stretch, of which slopes of the element, and mean ones of its neighbours, have EVEN or more.
+#: In elements shorter than LONG heights by no more than without stretch.
+THIN, EVEN, LONG, TINY = 0.55, 0.82, 1.85, 1e-12
 
 
 class Stretches:
@@ -37,16 +41,28 @@ class Stretches:
         C = np.concatenate([f.weights, f.starts[:, None]], axis=1)
         points = _controls(n, C)
         slopes = _controls(n - 1, C[..., 1:] * np.arange(1.0, n))
-        self._each, deep = n - 1, f.offsets == 0.0
-        parts: list[Any] = []
-        for e in (bottom, top[deep[top]]):
-            parts.append((slopes[:, e], e, 0.5 * ALONG * f.spans[e]))
-        parts.append((points[:, top] - points[:, bottom], bottom, -f.heights[bottom]))
+        self._each, deep = n - 1, f.offsets[bottom] == 0.0
         ends = np.flatnonzero(own & (f.spans == 0.0))
+        last, right = at[ends], f.places[ends] > f.places[bottom[at[ends]]]
+        # sections, and ends from both corners, which must not go back along d
+        most = np.where(deep, 1.0, THIN) * f.heights[bottom]
+        across, parts = points[:, top[deep]] - points[:, bottom[deep]], list[Any]()
+        backward = [(bottom[deep], across), (bottom[deep], -across)]
         for side in (bottom, top):
-            e = side[at[ends]]
-            corner = np.where((f.places[ends] > f.places[e])[:, None], points[-1, e], points[0, e])
-            parts.append((points[:, ends] - corner, e, f.offsets[e] - f.heights[e]))
+            corner = np.where(right[:, None], points[-1, side[last]], points[0, side[last]])
+            backward.append((bottom[last], np.where(right[:, None], 1.0, -1.0) * (
+                points[:, ends] - corner)))
+        for e in (bottom, top[deep]):
+            parts.append((slopes[:, e], e, 0.5 * ALONG * f.spans[e]))
+        # they may be as large as the beam is stretched there, if it is nearly as much nearby
+        e = bottom[np.union1d(np.flatnonzero(deep), last)]
+        mean = np.mean(slopes, axis=0)
+        parts.append((np.concatenate([slopes[:, e] - EVEN * mean[e], mean[e] - EVEN * slopes[
+            [0, -1]][:, e]]), e, TINY * f.spans[e]))
+        for e, x in backward:
+            size, grows = most[at[e]], f.spans[e] > LONG * f.heights[e]
+            parts.append((x + (grows * 2.0 * size / f.spans[e])[:, None] * mean[e], e, np.where(
+                grows, TINY, -1.0) * size))
         # those of an element one after another
         x, e, least = (np.concatenate(y) for y in zip(*(
             (x.transpose(1, 0, 2).reshape(-1, C.shape[1]), np.repeat(e, len(x)),
@@ -58,17 +74,18 @@ class Stretches:
     def cut(self, z: Array) -> tuple[Cut, Array, Array]:
         """The Cut at displacements z; of facets their part or -1, and which stretches are straight,
         of which number k has the parts k and k + 1."""
-        E, rows, each = len(self._chains), self.rows, self._each
-        if not E:
+        if not len(self._chains):
             return NOTHING, self.of, np.zeros(1, bool)
+        E, rows, each = len(self._chains), self.rows, self._each
         w, dofs = rows.weights[:, :E * each], rows.dofs[:, :E * each]
         t = (rows.starts[:E * each] + np.sum(w * z[dofs], axis=0)).reshape(E, each).sum(axis=1)
         angles = np.cumsum(np.append(0.0, np.angle(t[1:] * np.conj(t[:-1]))))
         part, k, low, high = np.ones(E, np.int64), 1, angles[0], angles[0]
         for e in range(1, E):
             low, high = min(low, angles[e]), max(high, angles[e])
-            if self._chains[e] != self._chains[e - 1] or high - low > TURN:
-                k, low, high = k + 1 + (self._chains[e] != self._chains[e - 1]), angles[e], angles[e]
+            other = int(self._chains[e] != self._chains[e - 1])  # no stretch with the part before
+            if other or high - low > TURN:
+                k, low, high = k + 1 + other, angles[e], angles[e]
             part[e] = k
         ends, level = np.zeros((2, k + 1), np.int64), np.round(angles / EQUAL)
         for s in range(k + 1):
@@ -79,7 +96,8 @@ class Stretches:
         of = np.array([part - 1, part])[:, self._elements]
         fits = np.ones(k + 1, bool)
         fits[of[~(progress(rows, Cut(of, ends), z) > 0.0)]] = False
-        return Cut(np.ascontiguousarray(np.where(fits[of], of, -1)), ends), np.where(self.of < 0, -1, part[self.of]), fits
+        return (Cut(np.ascontiguousarray(np.where(fits[of], of, -1)), ends),
+                np.where(self.of < 0, -1, part[self.of]), fits)
 
 
 #: Of members that cannot touch themselves.
