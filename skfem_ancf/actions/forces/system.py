@@ -298,7 +298,7 @@ class Forces:
         for spring, angle in zip(self._springs, self.contacts.turns):
             spring._last = float(angle)
 
-    def angles(self, u: Array) -> Array:
+    def _angles(self, u: Array) -> Array:
         """Angles of torsional springs at u, less than half a turn from the last ones; (k,)."""
         self.recall()
         return np.array([one.coordinate(np.array([link(u) for link in one.links]))[0]
@@ -330,7 +330,7 @@ class Forces:
 
     def follow(self, u: Array) -> None:
         """Keep the angles of torsional springs at u."""
-        self.contacts.turns[:] = self.angles(u)
+        self.contacts.turns[:] = self._angles(u)
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
