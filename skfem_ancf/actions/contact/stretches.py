@@ -1,10 +1,10 @@
 """Stretches of a beam that cannot touch themselves, since they are bent by less than a right angle.
 
 If the axis and both faces of a stretch go along a direction d by ALONG of their reference length at
-least, and sections extend along d by no more than the height, then places at least
-:data:`~skfem_ancf.actions.contact.pairs.APART` heights apart along the axis, which alone may touch,
-are farther from each other than :data:`~skfem_ancf.actions.contact.pairs.DEEPEST`, whatever the
-motion. Slopes of polynomials lie between their control points.
+least, and sections extend along d by no more than the height, times the stretch there, then places
+at least :data:`~skfem_ancf.actions.contact.pairs.APART` heights apart along the axis, which alone
+may touch, are farther from each other than :data:`~skfem_ancf.actions.contact.pairs.DEEPEST`,
+whatever the motion. Slopes of polynomials lie between their control points.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ class Rows(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Stretches: two of each vector, or -1, (2, K); slopes between which d is, (2, T)."""
+    """Stretches: one or two of each vector, or -1, (2, K); slopes between which d is, (2, T)."""
 
     of: I2
     ends: I2
@@ -50,7 +50,7 @@ def progress(rows, cut, z):
         mid = scaled(1.0 / np.maximum(size(low), TINY), low) + scaled(
             1.0 / np.maximum(size(high), TINY), high)
         d[s] = scaled(1.0 / np.maximum(size(mid), TINY), mid)
-    for part in range(2):
+    for part in range(cut.of.shape[0]):
         of = cut.of[part]
         for k in indices(b.size):
             way = dot(d[of[k]], b[k])
@@ -64,4 +64,4 @@ def straight(rows, cut, z):
     """True if no stretch can touch itself at displacements z."""
     if rows.starts.size == 0:
         return True
-    return smallest(shaped(progress(rows, cut, z), (2 * rows.starts.size,))) > 0.0
+    return smallest(shaped(progress(rows, cut, z), (cut.of.size,))) > 0.0

@@ -143,6 +143,12 @@ def left_of(clear, u):
 
 
 @source
+def share_of(clear, u):
+    """The part of the way to u (N,) from where surfaces were looked at that the margin allows."""
+    return SAFE * min(1.0, clear[MARGIN] / max(motion(clear, u), TINY))
+
+
+@source
 def set_clear(clear, u, margin):
     """Note how far points may move from u."""
     clear[MARGIN], seen = margin, clear[SEEN:SEEN + u.size]

@@ -18,7 +18,7 @@ from ..contact.pairs import candidates_of, pair_accept, pair_force, pair_tables
 from ..contact.stretches import straight
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, PASSED, RATE,
                               SAFE, SEARCHED, SETTLE, TANGENT, TURNS, ContactTables, Request,
-                              RESISTING as RUBBING, is_clear, left_of, set_clear)
+                              RESISTING as RUBBING, is_clear, left_of, set_clear, share_of)
 
 #: Kinds of elements.
 KINDS = 4
@@ -35,6 +35,8 @@ TURN = 2.0 * np.pi
 NONE = np.int64(0)
 #: The span of a mean between two states at one time.
 NO_SPAN = 1e-300
+#: Largest number of looks on the way of a correction.
+BALLS = 8
 
 
 class Kinds(NamedTuple):
@@ -175,7 +177,8 @@ def add_elastic_force(tables, t, span, u0, u1, f):
     # It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
-    if tables.paired > 0 and not at_rest(tables, u0, u1):
+    if tables.paired > 0 and not (rests(tables, u1, 0.0) and (
+            span == 0.0 or rests(tables, u0, 0.0))):
         _add_pairs(tables, span, u0, u1, f)
     _ask(tables, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
@@ -267,12 +270,24 @@ def way_is_clear(tables, t, u, du, f):
     ahead = u + du
     if nothing_touches(tables, ahead):
         return True
-    # what is left at u, and what is found ahead, are balls around points that have to meet
-    by_obstacles, by_members = left_of(tables.contacts.clear, u), left_of(tables.clear, u)
-    contact_work(tables, t, ahead, du, f)
-    return nothing_touches(tables, ahead) and (
-        tables.contacts.number == 0 or is_clear(tables.contacts.clear, u, -by_obstacles)) and (
-        tables.changing == 0 or rests(tables, u, -by_members))
+    # what is left at u, and what is found ahead, are balls around points that have to meet, or
+    # others between them
+    contacts = tables.contacts
+    by_obstacles, by_members = left_of(contacts.clear, u), left_of(tables.clear, u)
+    for _ in range(BALLS):
+        contact_work(tables, t, ahead, du, f)
+        if not nothing_touches(tables, ahead):
+            return False
+        if (contacts.number == 0 or is_clear(contacts.clear, u, -by_obstacles)) and (
+                tables.changing == 0 or rests(tables, u, -by_members)):
+            return True
+        share = min(share_of(contacts.clear, u) if contacts.number > 0 else 1.0,
+                    share_of(tables.clear, u) if tables.changing > 0 else 1.0)
+        if not share * BALLS > 1.0:
+            return False
+        for i in indices(u.size):
+            ahead[i] += share * (u[i] - ahead[i])
+    return False
 
 
 @source

@@ -57,8 +57,8 @@ class Stretches:
         # they may be as large as the beam is stretched there, if it is nearly as much nearby
         e = bottom[np.union1d(np.flatnonzero(deep), last)]
         mean = np.mean(slopes, axis=0)
-        parts.append((np.concatenate([slopes[:, e] - EVEN * mean[e], mean[e] - EVEN * slopes[
-            [0, -1]][:, e]]), e, TINY * f.spans[e]))
+        near = slopes[:, e] - EVEN * mean[e], mean[e] - EVEN * slopes[[0, -1]][:, e]
+        parts.append((np.concatenate(near), e, TINY * f.spans[e]))
         for e, x in backward:
             size, grows = most[at[e]], f.spans[e] > LONG * f.heights[e]
             parts.append((x + (grows * 2.0 * size / f.spans[e])[:, None] * mean[e], e, np.where(
@@ -93,7 +93,7 @@ class Stretches:
             if len(own):
                 low, high = np.argmin(level[own]), len(own) - 1 - np.argmax(level[own][::-1])
                 ends[:, s] = own[[low, high]] * each + each // 2
-        of = np.array([part - 1, part])[:, self._elements]
+        of = np.array([part - 1, part][-k:])[:, self._elements]  # one part is one stretch
         fits = np.ones(k + 1, bool)
         fits[of[~(progress(rows, Cut(of, ends), z) > 0.0)]] = False
         return (Cut(np.ascontiguousarray(np.where(fits[of], of, -1)), ends),
