@@ -23,4 +23,4 @@ from .callbacks import (call_custom, call_solver, custom_distance, deferred, han
 from .packed import Packed, constant, hints
 from .progress import announced_bar, progress_bar
 from .source import (C1, C2, C3, F1, F2, F3, I1, I2, I3, MADE, apart, everywhere, indices,
-                     primitive, room, shaped, source, where)
+                     primitive, room, shaped, somewhere, source, where)

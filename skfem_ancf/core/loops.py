@@ -423,5 +423,9 @@ def everywhere(condition):
     return condition
 
 
+def somewhere(condition):
+    return condition
+
+
 def where(condition, x, y):
     return x if condition else y

@@ -112,6 +112,12 @@ def where(condition, x, y):
 
 
 @primitive("skfem_ancf.core.loops")
+def somewhere(condition):
+    """True if a condition holds at a point."""
+    return np.any(condition)
+
+
+@primitive("skfem_ancf.core.loops")
 def everywhere(condition):
     """True if a condition holds at all points."""
     return np.all(condition)

@@ -10,7 +10,7 @@ from functools import partial
 from threading import RLock
 from typing import Any, NamedTuple
 
-from ..beam.kernels.tables import CUSTOM, HISTORY
+from ..beam.kernels.tables import HISTORY, points_of
 from ..core import Array, announced_bar, cached_property, code_cache, deferred, raise_kept
 from ..core.code_cache import compiled_off, compiled_setting
 from .tables import Tables
@@ -32,8 +32,8 @@ COMPILING = {"StrainTables": 8.0, "cables": 1.0, "own": 1.0, "elements": 7.0, "c
              "statics": 3.0, "motion": 9.0, "damping": 1.0, "rows": 1.0, "history": 1.0,
              "equilibrium": 1.5, "tangent": 0.5, "force": 0.2, "linearised": 0.2, "steps": 1.5}
 #: The same for functions that are compiled on first use only.
-WHERE_USED = {"laws": 3.0, "pairs": 8.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
-              "mean_force": 1.0, "viscous_force": 1.0}
+WHERE_USED = {"laws": 3.0, "histories": 4.0, "pairs": 8.0, "eigenstrains": 5.0,
+              "gradients": 2.0, "collocate": 25.0, "mean_force": 1.0, "viscous_force": 1.0}
 LOADING = 0.5
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds of compiling that need no reason once the parts are loaded.
@@ -73,12 +73,12 @@ class Backend:
             self._plain = "compiled=False"
         elif system.forces.contacts.custom:
             self._plain = "a user-defined distance (SignedDistance)"
-        elif any(pack.law.kind == HISTORY for pack in self.tables.plain.body.packs):
-            self._plain = "a law with a history"
-        elif any(pack.law.kind == CUSTOM
+        elif any(pack.law.kind == HISTORY and pack.along.ndim > 2
                  for pack in self.tables.plain.body.packs):
-            self._plain = ("a user-defined law in Python; a "
-                           "skfem_ancf.materials.PointwiseMaterial is compiled")
+            self._plain = "a cable of varying height with a law that has a history"
+        elif any(None in points_of(pack) for pack in self.tables.plain.body.packs):
+            self._plain = ("a user-defined law in Python; a PointwiseMaterial, or a "
+                           "HistoryMaterial with a method point, is compiled")
 
     @cached_property
     def linearised(self) -> Backend | None:
@@ -91,7 +91,7 @@ class Backend:
 
     def elastic_from(self, u: Array) -> Backend:
         """The backend for :meth:`Tables.elastic_from`."""
-        return self.with_tables(self.tables.elastic_from(u))
+        return self.after(self.tables.elastic_from(u))
 
     def with_tables(self, tables: Tables) -> Backend:
         """A copy for other tables."""

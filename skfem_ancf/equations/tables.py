@@ -138,6 +138,7 @@ class Tables:
                 "moments": self.plain.loads.moments.M.size > 0,
                 "joints": self.system.constraints.m > 0, "elements": forces.number > 0,
                 "laws": any(t.law.kind != LINEAR for t in packs),
+                "histories": any(t.law.kind == HISTORY for t in packs),
                 "contacts": forces.contacts.number > 0,
                 "pairs": forces.paired > 0,
                 "eigenstrains": len(self.plain.loads.eigenstrains) > 0}

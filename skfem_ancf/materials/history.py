@@ -10,6 +10,7 @@ import numpy as np
 from ..core import (Array, ConvergenceError, InputError, Law, rebuilt, refuse, require_integer,
                     require_positive, require_slope)
 from .base import LinearLaw, Material, hooke
+from .pointwise import MODULI
 
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle
 #: is right to 1 %; 20 points give 0.4 %, 10 points 1.5 %.
@@ -22,6 +23,15 @@ TINY, SMALL, SPAN = 1e-30, 1e-3, 1.0
 
 
 NO_VARIABLES: Mapping[str, int] = {}
+
+
+def python(function: Any) -> Any:
+    """A function in Python, of one that may be compiled."""
+    return getattr(function, "py_func", function)
+
+
+def real(x: Any) -> Array:
+    return np.asarray(x, dtype=float)
 
 
 class AtRest(LinearLaw):
@@ -38,7 +48,8 @@ class HistoryMaterial(Material):
 
     History variables are numbers at each integration point, zero at rest. They are a value that
     goes in and comes out: a law changes nothing in itself. A subclass defines :attr:`variables` and
-    :meth:`stress`. It runs in NumPy.
+    :meth:`stress`, which run in NumPy; or :attr:`variables`, the static methods :attr:`point` and
+    :attr:`stored`, and :attr:`constants`, which are compiled.
 
     Strain (eps_xx, eps_yy, 2 eps_xy) and stress (S_xx, S_yy, S_xy) are those of
     :class:`~skfem_ancf.materials.base.Material`, shape (3, ...). E and nu are those of small
@@ -83,6 +94,16 @@ class HistoryMaterial(Material):
 
     #: Names of the history variables, with their numbers of components.
     variables: Mapping[str, int] = NO_VARIABLES
+    #: ``point(constants, strain, history, dt, stress, moduli, after)`` writes stress, (D_11, D_12,
+    #: D_13, D_22, D_23, D_33) and history at the end, row by row. As in
+    #: :class:`~skfem_ancf.materials.PointwiseMaterial`, rows are arrays in NumPy and numbers in
+    #: compiled code. ``stored(constants, strain, history)`` returns the stored energy per volume.
+    point: Any = None
+    stored: Any = None
+    #: The same of fibres, with one strain, stress and modulus; without these, fibres of a cable
+    #: run in NumPy.
+    fibre: Any = None
+    fibre_stored: Any = None
 
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
@@ -107,6 +128,11 @@ class HistoryMaterial(Material):
         """Moduli at rest, (3, 3): those of E and nu."""
         return hooke(self.E, self.nu, self.plane)
 
+    @property
+    def compiles(self) -> bool:
+        """True if the law, or that of its fibres, is a function of a point."""
+        return self.point is not None or self.fibre is not None
+
     def rows(self, name: str) -> slice:
         """The rows of a variable in a history."""
         first = 0
@@ -119,16 +145,27 @@ class HistoryMaterial(Material):
 
     # what a law defines
 
+    @property
+    def constants(self) -> Array:
+        """Constants that :attr:`point` and the others take, shape (k,)."""
+        raise NotImplementedError(f"{type(self).__name__} has a method point and no constants")
+
     def stress(self, strain: Array, history: Array, dt: float  # type: ignore[override]
                ) -> tuple[Array, Array]:
         """The stress (3, ...), and the history at the end of the increment, (k, ...). At the strain
         at which a history was found, a further increment of ``dt = 0`` must give the same
         stress."""
-        raise NotImplementedError(f"{type(self).__name__} must define stress(strain, history, dt)")
+        if self.point is None:
+            raise NotImplementedError(
+                f"{type(self).__name__} must define stress(strain, history, dt)")
+        S, _, after = self.evaluate(strain, history, dt)
+        return S, after
 
     def moduli(self, strain: Array, history: Array, dt: float) -> Array:  # type: ignore[override]
         """Derivative (3, 3, ...) of the stress by the strain; by default by complex steps.
         Iterations take it as symmetric."""
+        if self.point is not None:
+            return self.evaluate(strain, history, dt)[1]
         out = []
         for j in range(3):
             step = np.zeros((3,) + (1,) * (np.ndim(strain) - 1), dtype=complex)
@@ -138,12 +175,25 @@ class HistoryMaterial(Material):
 
     def evaluate(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
         """Stress, moduli and history; to be overridden where they are found together."""
+        if self.point is not None:
+            S, D, after = self._at_points(self.point, real(strain), real(history), dt)
+            return S, D[list(MODULI)].reshape(3, *S.shape), after
         S, after = self.stress(strain, history, dt)
         return S, self.moduli(strain, history, dt), after
+
+    def _at_points(self, function, strain, history, dt):
+        """Stress, moduli and history of a function of a point, in NumPy."""
+        n = len(strain)
+        S, D = np.empty(strain.shape), np.empty((n * (n + 1) // 2, *strain.shape[1:]))
+        after = np.empty((self.number, *strain.shape[1:]))
+        python(function)(self.constants, strain, history, dt, S, D, after)
+        return S, D, after
 
     def energy(self, strain: Array, history: Array) -> Array:  # type: ignore[override]
         """Energy per volume that unloading would give back, or that is stored, shape (...). By
         default that of the stress in the elastic law. What else work has done is dissipated."""
+        if self.stored is not None:
+            return python(self.stored)(self.constants, strain, history)
         S = self.stress(strain, history, 0.0)[0]
         return 0.5 * np.sum(S * np.tensordot(np.linalg.inv(self.elastic), S, 1), axis=0)
 
@@ -162,6 +212,9 @@ class HistoryMaterial(Material):
         """Stress S_xx (...), its derivative, and history of fibres with S_yy = S_xy = 0. ``strain``
         (...) is that along the fibre. By default the lateral strain is found by Newton's method;
         ConvergenceError if it is not found, upon which solvers cut their step."""
+        if self.fibre is not None:
+            S, D, after = self._at_points(self.fibre, real(strain)[None], real(history), dt)
+            return S[0], D[0], after
         E = np.zeros((3, *np.shape(strain)))
         E[0], E[1] = strain, -self.lateral_ratio * strain
         left = np.inf
@@ -198,6 +251,8 @@ class HistoryMaterial(Material):
 
     def axial_energy(self, strain: Array, history: Array) -> Array:
         """As :meth:`energy` for fibres with S_yy = S_xy = 0."""
+        if self.fibre_stored is not None:
+            return python(self.fibre_stored)(self.constants, np.asarray(strain)[None], history)
         return 0.5 * self.axial(strain, history, 0.0)[0] ** 2 / self.axial_modulus
 
     # for what knows no history

@@ -2,11 +2,106 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..core import Array, ArrayLike, refuse, require_finite
-from .base import Material
+from ..core import Array, ArrayLike, refuse, require_finite, source
+from .base import LinearLaw, Material
 from .history import HistoryMaterial
+
+
+#: Places of the constants, and of the first share.
+AXIAL, MODULI, COMPLIANCE, SHARES = 0, 1, 7, 13
+
+
+@source
+def fraction(c, dt):
+    """The derivative of the stress by that of the law, for a constant rate over an increment."""
+    out = 1.0
+    for k in range(SHARES, len(c), 2):
+        out += c[k] * (mean(dt / c[k + 1]) - 1.0)
+    return out
+
+
+@source
+def mean(x):
+    """What remains at the end of a change at a constant rate, over x relaxation times."""
+    return -np.expm1(-x) / x if x > 0.0 else 1.0
+
+
+@source
+def relax(c, history, dt, S, after):
+    """Relax stresses S (1 or 3, ...) of the law in an increment."""
+    for i in range(len(S)):
+        now = 1.0 * S[i]
+        change, after[i] = now - history[i], now
+        for k in range(SHARES, len(c), 2):
+            j = 3 * (k - SHARES) // 2 + 3 + i
+            after[j] = np.exp(-dt / c[k + 1]) * history[j] + c[k] * mean(dt / c[k + 1]) * change
+            S[i] += after[j] - c[k] * now
+
+
+@source
+def product(D, x, out):
+    """The product of a symmetric matrix D (6,) and x (3, ...)."""
+    out[0] = D[0] * x[0] + D[1] * x[1] + D[2] * x[2]
+    out[1] = D[1] * x[0] + D[3] * x[1] + D[4] * x[2]
+    out[2] = D[2] * x[0] + D[4] * x[1] + D[5] * x[2]
+
+
+@source
+def square(D, x, y, z):
+    """The square of a vector by a symmetric matrix D (6,)."""
+    return D[0] * x * x + D[3] * y * y + D[5] * z * z + 2.0 * (
+        D[1] * x * y + D[2] * x * z + D[4] * y * z)
+
+
+@source
+def relaxing(c, strain, history, dt, S, D, after):
+    """Stress, moduli and history at a point."""
+    product(c[MODULI:], strain, S)
+    relax(c, history, dt, S, after)
+    part = fraction(c, dt)
+    for k in range(6):
+        D[k] = part * c[MODULI + k]
+
+
+@source
+def stored(c, strain, history):
+    """Stored energy at a point: of the law, and of the springs of the Maxwell elements."""
+    out = square(c[MODULI:], strain[0], strain[1], strain[2])
+    lasting = 1.0
+    for k in range(SHARES, len(c), 2):
+        lasting -= c[k]
+    out = lasting * out
+    for k in range(SHARES, len(c), 2):
+        j = 3 * (k - SHARES) // 2 + 3
+        out = out + square(c[COMPLIANCE:], history[j], history[j + 1], history[j + 2]) / c[k]
+    return 0.5 * out
+
+
+@source
+def relaxing_fibre(c, strain, history, dt, S, D, after):
+    """Stress, modulus and history of a fibre."""
+    S[0] = c[AXIAL] * strain[0]
+    for k in range(len(history)):
+        after[k] = history[k]
+    relax(c, history, dt, S, after)
+    D[0] = fraction(c, dt) * c[AXIAL]
+
+
+@source
+def stored_fibre(c, strain, history):
+    """Stored energy of a fibre."""
+    out, lasting = c[AXIAL] * strain[0] * strain[0], 1.0
+    for k in range(SHARES, len(c), 2):
+        lasting -= c[k]
+    out = lasting * out
+    for k in range(SHARES, len(c), 2):
+        stress = history[3 * (k - SHARES) // 2 + 3]
+        out = out + stress * stress / (c[k] * c[AXIAL])
+    return 0.5 * out
 
 
 class Prony(HistoryMaterial):
@@ -72,47 +167,39 @@ class Prony(HistoryMaterial):
     def is_hooke(self) -> bool:
         return self.material.is_hooke
 
-    def _fractions(self, dt):
-        """What remains of stresses after an increment, and of a change at a constant rate."""
-        x = dt / self.times
-        return np.exp(-x), np.where(x > 0.0, -np.expm1(-x) / np.where(x > 0.0, x, 1.0), 1.0)
+    @property
+    def constants(self) -> Array:
+        """Axial modulus, moduli (6,) and compliances (6,), then share and time of each element."""
+        D, at = self.elastic, np.triu_indices(3)
+        return np.concatenate([[self.axial_modulus], D[at], np.linalg.inv(D)[at],
+                               np.column_stack([self.shares, self.times]).ravel()])
 
-    def _relaxed(self, S, history, dt):
-        """Stress (c, ...), its part in the derivative by S0, and history."""
-        remains, part = self._fractions(dt)
-        after = np.array(history, dtype=np.result_type(S, history))
-        out, c = (1.0 - self.shares.sum()) * S, len(S)
-        for k, (g, a, b) in enumerate(zip(self.shares, remains, part)):
-            rows = slice(3 + 3 * k, 3 + 3 * k + c)
-            after[rows] = a * history[rows] + g * b * (S - history[:c])
-            out = out + after[rows]
-        after[:c] = S
-        return out, 1.0 - float(np.sum(self.shares * (1.0 - part))), after
+    @property
+    def point(self) -> Any:
+        """That of Hooke's law; None for others, which run in NumPy."""
+        return relaxing if isinstance(self._law, LinearLaw) else None
+
+    @property
+    def stored(self) -> Any:
+        return stored if isinstance(self._law, LinearLaw) else None
+
+    fibre, fibre_stored = staticmethod(relaxing_fibre), staticmethod(stored_fibre)
 
     def stress(self, strain: Array, history: Array, dt: float  # type: ignore[override]
                ) -> tuple[Array, Array]:
-        S, _, after = self._relaxed(self._law.stress(strain), np.asarray(history), dt)
+        if self.point is not None:
+            return super().stress(strain, history, dt)
+        S = np.array(self._law.stress(strain))
+        after = np.empty(np.broadcast_shapes(np.shape(history), (self.number, *S.shape[1:])))
+        relax(self.constants, history, dt, S, after)
         return S, after
 
     def moduli(self, strain: Array, history: Array, dt: float) -> Array:  # type: ignore[override]
-        part = 1.0 - float(np.sum(self.shares * (1.0 - self._fractions(dt)[1])))
-        return part * self._law.moduli(strain)
+        return fraction(self.constants, dt) * self._law.moduli(strain)
 
     def energy(self, strain: Array, history: Array) -> Array:  # type: ignore[override]
         """That of the springs: of the law, and of those that relax with its moduli at rest."""
-        out = (1.0 - self.shares.sum()) * self._law.energy(strain)
-        inverse = np.linalg.inv(self.elastic)
-        for k, g in enumerate(self.shares):
-            S = history[3 + 3 * k:6 + 3 * k]
-            out = out + 0.5 / g * np.sum(S * np.tensordot(inverse, S, 1), axis=0)
-        return out
-
-    def axial(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
-        E = self.axial_modulus
-        S, part, after = self._relaxed(E * np.asarray(strain)[None], history, dt)
-        return S[0], part * E + 0.0 * strain, after
-
-    def axial_energy(self, strain: Array, history: Array) -> Array:
-        E = self.axial_modulus
-        squares = sum(history[3 + 3 * k] ** 2 / g for k, g in enumerate(self.shares))
-        return 0.5 * (1.0 - self.shares.sum()) * E * strain**2 + 0.5 * squares / E
+        if self.stored is not None:
+            return super().energy(strain, history)
+        return (1.0 - self.shares.sum()) * self._law.energy(strain) + stored(
+            self.constants, 0.0 * strain, history)

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...core import F1, F2, I1, I2, apart, room, shaped, source
 from .compiled import W, CompiledTables
-from .tables import LINEAR, SECTION, conserve, law_evaluate
+from .increments import AT_START, evaluate_increment
+from .tables import HISTORY, LINEAR, SECTION, conserve, law_evaluate
 
 
 @source
@@ -209,20 +210,20 @@ def times(pairs, H, E, T):
 
 @source
 def at_points(t, first, E):
-    """Strains at the integration points, (3, points, W)."""
-    x = E.copy()
+    """Strains at the integration points, (3 or, of fibres, 1, points, W)."""
+    x, points = E.copy(), t.weights.shape[1]
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), x)
-    return shaped(np.dot(t.along, x), (3, t.weights.shape[1], t.width))
+    return shaped(np.dot(t.along, x), (len(t.along) // points, points, t.width))
 
 
 @source
 def from_points(t, first, S, T):
     """Weighted stresses from those S at the points."""
     w = block(t.weights, first)
-    for c in range(3):
+    for c in range(len(S)):
         multiply(w, S[c])
-    np.dot(t.along.T, shaped(S, (3 * len(w), t.width)), T)
+    np.dot(t.along.T, shaped(S, (len(S) * len(w), t.width)), T)
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), T)
 
@@ -240,6 +241,9 @@ def stresses(t, first, E, change, T):
 @apart("laws", CompiledTables, int, F2, F2, F2)
 def law_stresses(t, first, E, change, T):
     """:func:`stresses` of a nonlinear law."""
+    if t.law.kind == HISTORY:
+        mean_with_history(t, first, E, change, T)
+        return
     S, x = room((3, t.weights.shape[1], t.width)), at_points(t, first, E)
     law_evaluate(t.law, x, S)
     if len(change) > 0:
@@ -247,40 +251,64 @@ def law_stresses(t, first, E, change, T):
     from_points(t, first, S, T)
 
 
+@apart("histories", CompiledTables, int, F2, F2, F2)
+def mean_with_history(t, first, E, change, T):
+    """Stresses at the end of an increment, or with a ``change`` about E the mean of both ends."""
+    x, ends, m = at_points(t, first, E), 1 if len(change) == 0 else 2, t.memory
+    half, S = np.zeros(x.shape), np.zeros(x.shape)
+    if ends == 2:
+        half = at_points(t, first, change)
+    both, y = np.empty((len(x) + len(x)**2, *x.shape[1:])), np.empty(x.shape)
+    after = np.empty((len(m.history), *x.shape[1:]))
+    for end in range(ends):
+        a, b, c = x.ravel(), half.ravel(), y.ravel()
+        for k in range(len(a)):
+            c[k] = a[k] + (0.5 - end) * b[k] * (ends - 1)
+        evaluate_increment(t, first, y, AT_START if end == 1 else m.span[0], both, after)
+        a, b = S.ravel(), both.ravel()
+        for k in range(len(a)):
+            a[k] += b[k] / ends
+    from_points(t, first, S, T)
+
+
 @source
-def moduli(t, first, E):
-    """Weighted moduli between samples, (nq, W)."""
+def moduli(t, first, E, T):
+    """Weighted moduli between samples, (nq, W), and of a nonlinear law the stresses."""
     if t.law.kind == LINEAR:
         return block(t.H, first)
     H = np.empty((t.pattern.pairs.shape[1], t.width))
-    law_moduli(t, first, E, H)
+    law_moduli(t, first, E, T, H)
     return H
 
 
-@apart("laws", CompiledTables, int, F2, F2)
-def law_moduli(t, first, E, H):
+@apart("laws", CompiledTables, int, F2, F2, F2)
+def law_moduli(t, first, E, T, H):
     """:func:`moduli` of a nonlinear law."""
-    M = room((9, t.weights.shape[1], t.width))
-    law_evaluate(t.law, at_points(t, first, E), M)
-    between_samples(t, first, M, H)
+    n, points = len(t.along) // t.weights.shape[1], t.weights.shape[1]
+    both = np.empty((n + n * n, points, t.width))
+    if t.law.kind == HISTORY:
+        after = np.empty((len(t.memory.history), points, t.width))
+        evaluate_increment(t, first, at_points(t, first, E), t.memory.span[0], both, after)
+    else:
+        law_evaluate(t.law, at_points(t, first, E), both)
+    from_points(t, first, both[:n], T)
+    between_samples(t, first, both[n:], H)
 
 
 @source
 def between_samples(t, first, M, H):
-    """Moduli between samples from those at the points, (9, points, W)."""
-    pairs, along, w, points = t.pattern.pairs, t.along, block(t.weights, first), t.weights.shape[1]
+    """Moduli between samples from those at the points, (9 or 1, points, W)."""
+    pairs, points, w, begins, of, x = t.pattern.pairs, t.weights.shape[1], block(
+        t.weights, first), t.begins, t.of, t.mixing
     H[:] = 0.0
     for q in range(len(H)):
-        s, r, h = pairs[0, q], pairs[1, q], H[q]
-        for c in range(9):
-            for p in range(points):
-                x = along[c // 3 * points + p, s] * along[c % 3 * points + p, r]
-                if x != 0.0:
-                    a, b = w[p], M[c, p]
-                    for e in range(t.width):
-                        h[e] += x * a[e] * b[e]
+        h = H[q]
+        for k in range(begins[q], begins[q + 1]):
+            c, a, b = x[k], w[of[k] % points], M[of[k] // points, of[k] % points]
+            for e in range(t.width):
+                h[e] += c * a[e] * b[e]
         if len(t.sigma) > 0:
-            a, b = block(t.sigma, first)[s], block(t.sigma, first)[r]
+            a, b = block(t.sigma, first)[pairs[0, q]], block(t.sigma, first)[pairs[1, q]]
             for e in range(t.width):
                 h[e] *= a[e] * b[e]
 

@@ -4,13 +4,13 @@ each element such that few tables are needed: with derivatives ``G[e] = R[e] G D
 and D (graded meshes, arcs), rows are ``R^-1 r`` and unknowns ``D U``."""
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import F2, F3, I1, I2
-from .elements import scaled
-from .tables import (OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, LawTables, Pattern,
+from ...core import F1, F2, F3, I1, I2
+from .elements import scaled, to_moduli
+from .tables import (LINEAR, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, LawTables, Pattern,
                      StrainTables)
 
 #: Number of elements together.
@@ -47,6 +47,29 @@ def compiled_pattern(pattern: Pattern) -> CompiledPattern:
         pattern.of, pattern.products, np.ascontiguousarray(pattern.products[:, k != l]))
 
 
+class Memory(NamedTuple):
+    """History and eigenstrains at the start of an increment, eigenstrains at its end, (., points,
+    ne), and its time (1,); moduli (c, c) and stresses at zero strain of what is elastic, or
+    empty."""
+
+    history: F3
+    before: F3
+    now: F3
+    span: F1
+    elastic: F2
+    stress: F3
+
+
+_NO_MEMORY = Memory(*[_NOTHING] * 3, np.zeros(1), np.zeros((0, 0)), _NOTHING)
+
+
+def memory_of(elements: Any) -> Memory:
+    """The Memory of :class:`~skfem_ancf.beam.kernels.kernel.ElementsWithHistory`."""
+    elastic = elements.elastic or _NO_MEMORY[4:]
+    return Memory(elements.history, elements.before, elements.now, elements.span,
+                  *map(np.ascontiguousarray, elastic))
+
+
 class CompiledTables(NamedTuple):
     """The StrainTables for compiled kernels; n = 1 if all blocks of elements are equal. m is the
     number of functions G, np that of products of rows in tangents. Vectors (2 W) have the
@@ -71,8 +94,12 @@ class CompiledTables(NamedTuple):
     Z: F3  # (n, m (m - 1) / 2, W), or empty
     coupled: I2  # functions k >= l that it couples, and 1 if x is coupled to y, (3, nc)
     law: LawTables
-    along: F2  # from samples to integration points, (3 points, ns)
+    along: F2  # from samples to integration points, (3 points, ns), of fibres (points, ns)
     weights: F3  # of the points, (n, points, W)
+    mixing: F1  # from moduli at the points to those between samples, a sparse matrix (nq, .)
+    of: I1  # its columns
+    begins: I1  # of its rows
+    memory: Memory
 
 
 def compiled_tables(t: StrainTables) -> CompiledTables:
@@ -98,7 +125,14 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
         compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
         _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled, t.law, t.along,
-        _blocks(each(t.weights, OF_WEIGHTS)))
+        _blocks(each(t.weights, OF_WEIGHTS)), *_mixing(t), _NO_MEMORY)
+
+
+def _mixing(t):
+    if t.law.kind == LINEAR:
+        return np.zeros(0), _NO_INTS, _NO_INTS
+    M = to_moduli(t)
+    return M.data, M.indices.astype(np.int64), M.indptr.astype(np.int64)
 
 
 def _rest(x):

@@ -85,6 +85,18 @@ def _to_rows(terms: bytes, rows: int) -> Any:
     return sparse.csr_matrix((np.ones(6 * n), (to, of)), shape=(3 * rows**2, 4 * n))
 
 
+def to_moduli(t: StrainTables) -> Any:
+    """Sparse matrix from moduli at the points (9 points, of fibres points) to those between samples
+    (nq)."""
+    from scipy import sparse
+
+    (s, z), A = t.pairs, t.along.reshape(-1, t.weights.shape[1], t.along.shape[1])
+    c, n = np.abs(A).sum(axis=1).argmax(axis=0), len(A)  # component of each sample
+    M = np.zeros((len(s), n * n, A.shape[1]))
+    M[np.arange(len(s)), n * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
+    return sparse.csr_matrix(M.reshape(len(s), -1))
+
+
 class Elements:
     """The elements of :class:`~skfem_ancf.beam.kernels.tables.StrainTables` t. Displacements are
     (N,), weighted stresses and strains (ns, ne), forces (N,), bands flat."""
@@ -236,16 +248,10 @@ class Elements:
     def _to_moduli(self):
         """Sparse matrix from moduli at the points (9 points) to those between samples (nq), or one
         of each element where the height of a cable varies."""
-        from scipy import sparse
-
-        (s, z), along = self.t.pairs, self.t.along
-        if along.ndim > 2:
+        if self.t.along.ndim > 2:
+            (s, z), along = self.t.pairs, self.t.along
             return along[:, :, s] * along[:, :, z]
-        A = along.reshape(-1, self.t.weights.shape[1], self.ns)
-        c, n = np.abs(A).sum(axis=1).argmax(axis=0), len(A)  # component of each sample
-        M = np.zeros((len(s), n * n, A.shape[1]))
-        M[np.arange(len(s)), n * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
-        return sparse.csr_matrix(M.reshape(len(s), -1))
+        return to_moduli(self.t)
 
     def _moduli_of_samples(self, D):
         """Moduli (nq, ne) between samples from those at the points, as if they were symmetric."""

@@ -326,7 +326,7 @@ class ElementsWithHistory(Elements):
         self._own(np.zeros(history_size(t)), np.zeros(1), np.zeros(history_size(t)))
         self._scale = t.law.scale.reshape(3, 1, 1)
         self._known: Any = (np.zeros(0), None, np.zeros(0), np.zeros(0), np.nan)
-        self._from: Any = None  # strain and stress from which it is elastic
+        self.elastic: Any = None  # moduli (c, c) and stress at zero strain if it is elastic
 
     def _own(self, history, span, now):
         shape, n = (_rows(self.t), self.t.weights.shape[1], self.ne), self.material.number
@@ -344,10 +344,8 @@ class ElementsWithHistory(Elements):
     def elastic_from(self, u: Array) -> ElementsWithHistory:
         """A copy that is elastic from its stress at u: no yielding, no relaxation."""
         other, E = copy(self), self.strain_at(u)
-        D = (np.atleast_2d(self.material.axial_modulus) if self._fibres else
-             self._scale[:, 0] * self.material.elastic * self._scale[:, 0, 0])
-        other._from = E - self.before, self.evaluate(E, 0.0)[0], np.broadcast_to(
-            D[..., None, None], (*D.shape, *E.shape[1:]))
+        D = np.atleast_2d(self.material.axial_modulus) if self._fibres else self.t.law.D
+        other.elastic = D, self.evaluate(E, 0.0)[0] - np.tensordot(D, E - self.before, 1)
         return other
 
     def evaluate(self, E: Array, dt: float | None = None) -> tuple[Array, Array, Array]:
@@ -355,9 +353,10 @@ class ElementsWithHistory(Elements):
         They are at the end of the increment; with ``dt = 0`` at its start."""
         E = E - (self.now if dt is None else self.before)
         dt = float(self.span[0]) if dt is None else dt
-        if self._from is not None:
-            E0, S0, D = self._from
-            return S0 + np.einsum("ij...,j...->i...", D, E - E0), D, self.history
+        if self.elastic is not None:
+            D, S0 = self.elastic
+            return S0 + np.tensordot(D, E, 1), np.broadcast_to(
+                D[..., None, None], (*D.shape, *E.shape[1:])), self.history
         if self._fibres:
             S, D, after = self.material.axial(E[0], self.history, dt)
             return S[None], D[None, None], after

@@ -11,7 +11,8 @@ from .blocks import (add, add_forces_of, add_geometric, add_material, add_matric
                      moduli, place, products, put, scale_products, strains, stresses, take, times,
                      to_rows)
 from .compiled import W, CompiledTables
-from .tables import LINEAR, conserve, law_evaluate
+from .increments import AT_START, evaluate_increment, of_block
+from .tables import HISTORY, LINEAR, conserve, evaluate_history, law_evaluate
 
 
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
@@ -63,7 +64,7 @@ def run_linearised(t, u, du, given, out, f):
         to_rows(t, first, U, dd)
         if t.law.kind != LINEAR:
             strains(t, first, d, r, E)
-        H, D = moduli(t, first, E), directions(t, r, d[:0], X)
+        H, D = moduli(t, first, E, T), directions(t, r, d[:0], X)
         changes(t, D, dd, E)
         times(t.pattern.pairs, H, E, T)
         if out.size > 0:
@@ -84,15 +85,16 @@ def run_tangent(t, u, given, out, f, A, ld):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
         X = directions(t, r, d[:0], Y)
-        if out.size > 0 or f.size > 0 or given.size == 0:
-            stresses(t, first, E, E[:0], T)
+        H = moduli(t, first, E, T)
+        if t.law.kind == LINEAR and (out.size > 0 or f.size > 0 or given.size == 0):
+            times(t.pattern.pairs, H, E, T)
         if out.size > 0:
             put(t, first, T, out[:0], out)
         if f.size > 0:
             add_forces_of(t, first, X, T, U, B, F, f)
         w[:] = 0.0
         z[:] = 0.0
-        add_material(t, moduli(t, first, E), X, w, z)
+        add_material(t, H, X, w, z)
         if given.size > 0:
             take(t, first, given, T)
         add_geometric(t, r, T, w)
@@ -106,7 +108,8 @@ def run_unsymmetric(t, u, v, A, ld):
     add_multiple(-1.0, u, du)
     work = room((m + 3 * R + 2 * n, 2 * t.width))
     U, d, r, s = work[:m], work[m:m + R], work[m + R:m + 2 * R], work[m + 2 * R:m + 3 * R]
-    E, X, Y = room((ns, t.width)), work[m + 3 * R:m + 3 * R + n], work[m + 3 * R + n:]
+    E, T = room((ns, t.width)), room((ns, t.width))
+    X, Y = work[m + 3 * R:m + 3 * R + n], work[m + 3 * R + n:]
     terms, skew = t.pattern.products.shape[1], t.pattern.skew.shape[1]
     w, z = room((terms, 4 * t.width)), room((skew, 4 * t.width))
     K, Z = room((m * (m + 1) // 2, 4 * t.width)), room((m * (m - 1) // 2, 4 * t.width))
@@ -123,7 +126,7 @@ def run_unsymmetric(t, u, v, A, ld):
         add(-1.0, one, two)
         w[:] = 0.0
         z[:] = 0.0
-        add_difference(t, moduli(t, first, E), one, two, w, z)
+        add_difference(t, moduli(t, first, E, T), one, two, w, z)
         products(t, first, w, z, K, Z)
         if len(t.D) > 0:
             scale_products(block(t.D, first), K, 1)
@@ -213,12 +216,18 @@ def eigen_mean(t, u, v, shift, f):
 def run_eigen_force(t, u, v, given, f):
     if t.law.kind == LINEAR:
         run_force(t, u, v, given, u[:0], f)
-    else:
+    elif t.law.kind != HISTORY:
         eigen_mean(t, u, v if v.size > 0 else u, given, f)
 
 
-@apart("eigenstrains", CompiledTables, F1, F1, F1, int)
 def run_eigen_tangent(t, u, given, A, ld):
+    if t.law.kind != HISTORY:
+        eigen_tangent(t, u, given, A, ld)
+
+
+@apart("eigenstrains", CompiledTables, F1, F1, F1, int)
+def eigen_tangent(t, u, given, A, ld):
+    """Change of the tangent at u by eigenstrains."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     U, d, r = room((m, 2 * t.width)), room((R, 2 * t.width)), room((R, 2 * t.width))
     E, T = room((ns, t.width)), room((ns, t.width))
@@ -244,9 +253,45 @@ def run_eigen_tangent(t, u, given, A, ld):
         add_matrices(t, first, w, z, 0, ld, A)
 
 
-def run_accept(t, u, v, out):
-    pass  # scenes of laws with a history run in NumPy
-
-
 def run_put(t, given):
-    pass  # as well
+    if t.law.kind == HISTORY:
+        now = t.memory.now.ravel()
+        for k in range(len(now)):
+            now[k] = -given[k]
+
+
+def run_accept(t, u, v, out):
+    if t.law.kind == HISTORY:
+        accept(t, u, v, out)
+
+
+@apart("histories", CompiledTables, F1, F1, F1)
+def accept(t, u, v, out):
+    """Set the history after an increment from u to v; add what it dissipates to ``out[0]``."""
+    R, m, memory = t.G.shape[0], t.G.shape[1], t.memory
+    U, d, r = room((m, 2 * t.width)), room((R, 2 * t.width)), room((R, 2 * t.width))
+    E, ne, points = room((t.pattern.rows.shape[1], t.width)), len(t.start), t.weights.shape[1]
+    n, k = len(t.along) // points, len(memory.history)
+    S, x = np.empty((2, n + n * n, points, t.width)), np.empty((2, n, points, t.width))
+    h, energy = np.empty((2, k, points, t.width)), np.empty((2, 1, points, t.width))
+    for first in range(0, ne, W):
+        for end in range(2):
+            displaced(t, first, u if end == 0 else v, U, d, r)
+            strains(t, first, d, r, E)
+            x[end] = at_points(t, first, E)
+            evaluate_increment(
+                t, first, x[end], AT_START if end == 0 else memory.span[0], S[end], h[1])
+            if end == 0:
+                of_block(memory.history, first, h[1])
+            evaluate_history(t.law, x[end], h[1], 0.0, energy[end], h[0])
+        w = block(t.weights, first)
+        for p in range(points):
+            for e in range(min(t.width, ne - first)):
+                lost = energy[0, 0, p, e] - energy[1, 0, p, e]
+                for c in range(n):  # strains are scaled
+                    lost += 0.5 * (S[0, c, p, e] + S[1, c, p, e]) * (
+                        x[1, c, p, e] - x[0, c, p, e]) / t.law.scale[c]
+                    memory.before[c, p, first + e] = memory.now[c, p, first + e]
+                for c in range(k):
+                    memory.history[c, p, first + e] = h[1, c, p, e]
+                out[0] += w[p, e] * lost

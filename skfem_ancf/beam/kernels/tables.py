@@ -206,9 +206,22 @@ def evaluate_points(law, strain, out):
     out[...] = _LAWS[law.handle].evaluated(strain, len(out))
 
 
-def point_of(law: LawTables) -> Any:
-    """The function of a pointwise law, or None."""
-    return _LAWS[law.handle].point if law.kind == POINTWISE else None
+@primitive("skfem_ancf.equations.loops")
+def evaluate_history(law, strain, history, dt, out, after):
+    """Stress and moduli, and the history after an increment, or energy, of a law with a history;
+    compiled code calls its address. NumPy has
+    :class:`~skfem_ancf.beam.kernels.kernel.ElementsWithHistory`."""
+
+
+def points_of(t: StrainTables) -> tuple[Any, ...]:
+    """The functions of a nonlinear law for compiled code: of a point, and of the energy stored at
+    one that has a history. They are None for laws that run in Python."""
+    if t.law.kind == LINEAR:
+        return ()
+    law = _LAWS[t.law.handle]
+    if t.law.kind == HISTORY:
+        return (law.fibre, law.fibre_stored) if t.kind == CABLE else (law.point, law.stored)
+    return (law.point if t.law.kind == POINTWISE else None,)
 
 
 def material_of(law: LawTables) -> Any:
@@ -277,7 +290,8 @@ def law_tables(law: Any, owner: Any) -> LawTables:
         handle = next(_handles)
         _LAWS[handle] = law.material
         weakref.finalize(owner, _LAWS.pop, handle, None)
-        return LawTables(HISTORY, handle, 0, law.D.copy(), np.zeros(3), law.scale)
+        constants = law.material.constants if law.material.compiles else np.zeros(3)
+        return LawTables(HISTORY, handle, 0, law.D.copy(), constants, law.scale)
     if isinstance(law, LinearLaw):
         return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
     base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
