@@ -6,11 +6,13 @@ from elbow import between, joint_examples
 from noise import alike
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ElasticPlastic, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamCable, ElementBeamPatelShabana, EnergyMomentum,
+                        GeneralizedAlpha, MeshBeam, Prony, Scene, StVenantKirchhoff, Voce)
 from skfem_ancf.actions.joints import JOINTS
 from skfem_ancf.core.code_cache import compiled_off
+from skfem_ancf.equations.evaluation import force
+from skfem_ancf.materials import HistoryMaterial
 
 if compiled_off() is not None:
     pytest.skip(compiled_off(), allow_module_level=True)
@@ -67,6 +69,88 @@ def test_same_force_tangent_and_carried_stress(mesh, element, formulation, plane
     assert ways(scenes[0]) == ["plain"] * 2 and "plain" not in ways(scenes[1])
     for a, b in zip(*found):
         assert_allclose(b, a, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+class Damaged(HistoryMaterial):
+    """Its modulus decreases with the largest stretch; a user-defined law of a point."""
+
+    variables = {"largest": 1}  # noqa: RUF012
+    constants = property(lambda self: np.array([self.E]))
+
+    @staticmethod
+    def point(constants, strain, history, dt, stress, moduli, after):
+        after[0] = np.maximum(history[0], np.abs(strain[0]))
+        grows = np.where(np.abs(strain[0]) > history[0], np.abs(strain[0]), 0.0)
+        E = constants[0] / (1.0 + 5.0 * after[0])
+        stress[0], stress[1], stress[2] = E * strain[0], constants[0] * strain[1], (
+            0.5 * constants[0] * strain[2])
+        moduli[0], moduli[1], moduli[2] = E - 5.0 * E * grows / (1.0 + 5.0 * after[0]), 0.0, 0.0
+        moduli[3], moduli[4], moduli[5] = constants[0], 0.0, 0.5 * constants[0]
+
+    @staticmethod
+    def stored(constants, strain, history):
+        E = constants[0]
+        return 0.5 * E * (strain[0] * strain[0] / (1.0 + 5.0 * history[0]) + strain[1] * strain[1]
+                          + 0.5 * strain[2] * strain[2])
+
+
+#: Laws with a history; a plane strain fibre needs a lateral strain and runs in NumPy.
+PLASTIC = dict(E=2.0, nu=0.3, yield_stress=0.02, density=1.0)
+REMEMBER = {
+    "perfect": ElasticPlastic(**PLASTIC),
+    "kinematic": ElasticPlastic(**PLASTIC, hardening=0.05, kinematic=0.1),
+    "Voce": ElasticPlastic(**PLASTIC, hardening=Voce(0.02, 20.0, 0.01), plane="strain"),
+    "table": ElasticPlastic(**PLASTIC, hardening=[[0.0, 0.02], [0.01, 0.025], [0.05, 0.03]]),
+    "Prony": Prony(StVenantKirchhoff(2.0, 0.3, 1.0), [0.3, 0.2], [0.5, 2.0], points=4),
+    "plane strain": Prony(StVenantKirchhoff(2.0, 0.3, 1.0, plane="strain"), [0.4], [1.0]),
+    "user-defined": Damaged(2.0, 0.0, 1.0),
+}
+IN_NUMPY = [("Voce", 0), ("user-defined", 0)]
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFCubic(2),
+                                     ElementBeamCable(5)], ids=repr)
+@pytest.mark.parametrize("law", REMEMBER)
+def test_same_laws_with_a_history(law, element, mesh):
+    """After two bends: forces, means, tangents, eigenstrains, and what is elastic from there."""
+    rng, found = np.random.default_rng(1), []
+    scenes = both(MESHES[mesh](), element, "assumed", REMEMBER[law])
+    u, v, w = 0.05 * rng.standard_normal((3, scenes[0].N))
+    if element.order == 0:
+        for x in (u, v, w):
+            x.reshape(-1, element.nodal_dofs, 2)[:, 2:] *= 0.1
+    for scene in scenes:
+        s = scene.clamp("left").eigenstrain(xx=0.01).system
+        s = s.after(s.histories.accept(0.0 * u, u, 1.0)[0], 0.2)
+        s = s.after(s.histories.accept(u, v, 1.0)[0], 0.3)
+        assembly = s.assemble(w)
+        K, elastic = s.K.tocsc().toarray(), np.zeros(s.N)
+        s.assemble(w, independent=s.linearised_stress(w, assembly[1], u))
+        backend = s.backend.elastic_from(v)
+        backend.of(force)(w, 1.0, elastic)
+        found.append((*assembly, K, s.K.tocsc().toarray(), s.internal_force(w),
+                      s.mean_internal_force(v, w), elastic))
+    plain = element.order == 0 and (law, 0) in IN_NUMPY
+    assert ("plain" in ways(scenes[1])) == plain
+    for a, b in zip(*found):
+        assert_allclose(b, a, rtol=0, atol=1e-11 * np.abs(a).max())
+
+
+@pytest.mark.parametrize("law", ["kinematic", "Prony"])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
+def test_same_runs_and_motions_of_laws_with_a_history(element, law):
+    found = []
+    for scene in both(MeshBeam.init_line(np.linspace(0, 1, 9), 0.1), element, "assumed",
+                      REMEMBER[law]):
+        scene.clamp("left").point_force((0.0, -2e-4), at="right")
+        run = scene.run([1.0, 2.0], increments=4)
+        motion = scene.integrate(2.0, 0.02)
+        found.append((scene.solve_static().u, run.u, run.dissipated, motion.u, motion.dissipated))
+    assert "plain" not in ways(scene)
+    assert found[0][2][-1] > 0.0 or law == "kinematic"
+    for a, b in zip(*found):
+        assert_allclose(b, a, rtol=0, atol=1e-9 * np.abs(a).max())
 
 
 @pytest.mark.parametrize("plane", ["stress", "strain"])

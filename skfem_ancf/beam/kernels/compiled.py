@@ -60,7 +60,7 @@ class Memory(NamedTuple):
     stress: F3
 
 
-_NO_MEMORY = Memory(*[_NOTHING] * 3, np.zeros(1), np.zeros((0, 0)), _NOTHING)
+_NO_MEMORY = Memory(_NOTHING, _NOTHING, _NOTHING, np.zeros(1), np.zeros((0, 0)), _NOTHING)
 
 
 def memory_of(elements: Any) -> Memory:
@@ -120,12 +120,13 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
         scales = _scales(D), _scales(sigma)
     K, Z, coupled = _constant(each(t.C, OF_C), D)
     P, Q = map(np.ascontiguousarray, _products(G[0], pattern.products, own))
+    mixing, of, begins = _mixing(t)
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
         compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
         _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled, t.law, t.along,
-        _blocks(each(t.weights, OF_WEIGHTS)), *_mixing(t), _NO_MEMORY)
+        _blocks(each(t.weights, OF_WEIGHTS)), mixing, of, begins, _NO_MEMORY)
 
 
 def _mixing(t):
