@@ -14,12 +14,14 @@ AT_START = -1.0
 @source
 def of_block(x, first, out):
     """Values (., points, ne) of a block of elements, (., points, W); the last fills the block."""
-    last = x.shape[2] - 1
+    last = min(out.shape[2], x.shape[2] - first)
     for k in range(len(out)):
         for p in range(out.shape[1]):
-            a, b = x[k, p], out[k, p]
-            for e in range(len(b)):
-                b[e] = a[min(first + e, last)]
+            a, b = x[k, p, first:], out[k, p]
+            for e in range(last):
+                b[e] = a[e]
+            for e in range(last, len(b)):
+                b[e] = a[last - 1]
 
 
 @apart("histories", CompiledTables, int, F3, float, F3, F3)
