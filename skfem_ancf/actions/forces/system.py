@@ -62,8 +62,6 @@ class Forces:
     #: changing elements, and what they were computed from.
     kept: Any = NONE, NONE, np.zeros(0)
     _last: Any = None, ()
-    #: The last two displacements at which these are known to do nothing.
-    _rested: tuple[Array, ...] = ()
 
     def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
@@ -358,13 +356,8 @@ class Forces:
     # elements with a pattern that changes
 
     def _at_rest(self, *displacements: Array) -> bool:
-        """True if it is known that they do nothing at displacements (N,)."""
-        for u in displacements:
-            if not any(np.array_equal(u, x) for x in self._rested):
-                if not rests(self, u, 0.0):
-                    return False
-                self._rested = u.copy(), *self._rested[:1]
-        return True
+        """True if it is known that they do nothing at displacements (N,), nor between these."""
+        return all(rests(self, u, 0.0) for u in displacements)
 
     def changing_entries(self, t: float, u0: Array, u1: Array, v: Array | None = None,
                          factor: float = 0.0) -> tuple[Array, Array, Array]:
