@@ -89,16 +89,24 @@ def _of_increments(point, stored):
     """Stresses, moduli and history, or energies, at all points."""
     def of_increments(constants, strain, history, dt, out, after):
         n = len(strain)
-        D = np.empty(n * (n + 1) // 2)
+        x, S, D = np.empty(n), np.empty(n), np.empty(n * (n + 1) // 2)
+        h, end = np.empty(len(history)), np.empty(len(history))
         for p in range(strain.shape[1]):
             for e in range(strain.shape[2]):
-                x, h = strain[:, p, e], history[:, p, e]
+                for k in range(n):
+                    x[k] = strain[k, p, e]
+                for k in range(len(h)):
+                    h[k] = history[k, p, e]
                 if len(out) == 1:
                     out[0, p, e] = stored(constants, x, h)
-                else:
-                    point(constants, x, h, dt, out[:n, p, e], D, after[:, p, e])
-                    for k in range(n * n):
-                        out[n + k, p, e] = D[MODULI[k]]
+                    continue
+                point(constants, x, h, dt, S, D, end)
+                for k in range(n):
+                    out[k, p, e] = S[k]
+                for k in range(n * n):
+                    out[n + k, p, e] = D[MODULI[k]]
+                for k in range(len(h)):
+                    after[k, p, e] = end[k]
 
     return of_increments
 

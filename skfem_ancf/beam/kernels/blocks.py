@@ -211,19 +211,37 @@ def times(pairs, H, E, T):
 @source
 def at_points(t, first, E):
     """Strains at the integration points, (3 or, of fibres, 1, points, W)."""
-    x, points = E.copy(), t.weights.shape[1]
+    x, out = E.copy(), np.empty((components(t), t.weights.shape[1], t.width))
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), x)
-    return shaped(np.dot(t.along, x), (len(t.along) // points, points, t.width))
+    product(t.along.rows, t.along.columns, t.along.values, x, shaped(
+        out, (len(out) * out.shape[1], t.width)))
+    return out
+
+
+@source
+def components(t):
+    """Number of strains at an integration point: fibres have one."""
+    return 3 if t.kind == SECTION else 1
+
+
+@source
+def product(rows, columns, values, X, Y):
+    """Y = A X of a sparse matrix; of its transpose, if rows and columns are exchanged."""
+    Y[:] = 0.0
+    for k in range(len(values)):
+        c, x, y = values[k], X[columns[k]], Y[rows[k]]
+        for e in range(len(y)):
+            y[e] += c * x[e]
 
 
 @source
 def from_points(t, first, S, T):
     """Weighted stresses from those S at the points."""
-    w = block(t.weights, first)
+    w, A = block(t.weights, first), t.along
     for c in range(len(S)):
         multiply(w, S[c])
-    np.dot(t.along.T, shaped(S, (len(S) * len(w), t.width)), T)
+    product(A.columns, A.rows, A.values, shaped(S, (len(S) * len(w), t.width)), T)
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), T)
 
@@ -284,7 +302,7 @@ def moduli(t, first, E, T):
 @apart("laws", CompiledTables, int, F2, F2, F2)
 def law_moduli(t, first, E, T, H):
     """:func:`moduli` of a nonlinear law."""
-    n, points = len(t.along) // t.weights.shape[1], t.weights.shape[1]
+    n, points = components(t), t.weights.shape[1]
     both = np.empty((n + n * n, points, t.width))
     if t.law.kind == HISTORY:
         after = np.empty((len(t.memory.history), points, t.width))
@@ -298,17 +316,13 @@ def law_moduli(t, first, E, T, H):
 @source
 def between_samples(t, first, M, H):
     """Moduli between samples from those at the points, (9 or 1, points, W)."""
-    pairs, points, w, begins, of, x = t.pattern.pairs, t.weights.shape[1], block(
-        t.weights, first), t.begins, t.of, t.mixing
-    H[:] = 0.0
-    for q in range(len(H)):
-        h = H[q]
-        for k in range(begins[q], begins[q + 1]):
-            c, a, b = x[k], w[of[k] % points], M[of[k] // points, of[k] % points]
-            for e in range(t.width):
-                h[e] += c * a[e] * b[e]
-        if len(t.sigma) > 0:
-            a, b = block(t.sigma, first)[pairs[0, q]], block(t.sigma, first)[pairs[1, q]]
+    pairs, w, A = t.pattern.pairs, block(t.weights, first), t.mixing
+    for c in range(len(M)):
+        multiply(w, M[c])
+    product(A.rows, A.columns, A.values, shaped(M, (len(M) * len(w), t.width)), H)
+    if len(t.sigma) > 0:
+        for q in range(len(H)):
+            a, b, h = block(t.sigma, first)[pairs[0, q]], block(t.sigma, first)[pairs[1, q]], H[q]
             for e in range(t.width):
                 h[e] *= a[e] * b[e]
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from ...core import F1, F2, F3, I1, I2
 from .elements import scaled, to_moduli
@@ -45,6 +46,14 @@ def compiled_pattern(pattern: Pattern) -> CompiledPattern:
         pattern.rows, np.array([first, second]), pattern.pairs,
         np.array([p, skew[p], number[a], number[b], q]), np.where(a == b, 0.5, 1.0)[None],
         pattern.of, pattern.products, np.ascontiguousarray(pattern.products[:, k != l]))
+
+
+class Sparse(NamedTuple):
+    """A sparse matrix by its entries."""
+
+    rows: I1
+    columns: I1
+    values: F1
 
 
 class Memory(NamedTuple):
@@ -94,11 +103,9 @@ class CompiledTables(NamedTuple):
     Z: F3  # (n, m (m - 1) / 2, W), or empty
     coupled: I2  # functions k >= l that it couples, and 1 if x is coupled to y, (3, nc)
     law: LawTables
-    along: F2  # from samples to integration points, (3 points, ns), of fibres (points, ns)
+    along: Sparse  # from samples to integration points, (3 points, ns), of fibres (points, ns)
     weights: F3  # of the points, (n, points, W)
-    mixing: F1  # from moduli at the points to those between samples, a sparse matrix (nq, .)
-    of: I1  # its columns
-    begins: I1  # of its rows
+    mixing: Sparse  # from moduli at the points, (9 or 1 times points,), to those between samples
     memory: Memory
 
 
@@ -120,20 +127,19 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
         scales = _scales(D), _scales(sigma)
     K, Z, coupled = _constant(each(t.C, OF_C), D)
     P, Q = map(np.ascontiguousarray, _products(G[0], pattern.products, own))
-    mixing, of, begins = _mixing(t)
+    along, mixing = map(_sparse, (
+        t.along, t.along[:0] if t.law.kind == LINEAR else to_moduli(t)))
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
         compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
-        _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled, t.law, t.along,
-        _blocks(each(t.weights, OF_WEIGHTS)), mixing, of, begins, _NO_MEMORY)
+        _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled, t.law, along,
+        _blocks(each(t.weights, OF_WEIGHTS)), mixing, _NO_MEMORY)
 
 
-def _mixing(t):
-    if t.law.kind == LINEAR:
-        return np.zeros(0), _NO_INTS, _NO_INTS
-    M = to_moduli(t)
-    return M.data, M.indices.astype(np.int64), M.indptr.astype(np.int64)
+def _sparse(A):
+    A = coo_array(A)
+    return Sparse(*(x.astype(np.int64) for x in A.coords), A.data)
 
 
 def _rest(x):

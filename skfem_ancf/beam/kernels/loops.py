@@ -7,9 +7,9 @@ import numpy as np
 from ...core.band import add_multiple
 from ...core import F1, F2, I1, apart, room, source
 from .blocks import (add, add_forces_of, add_geometric, add_material, add_matrices, at_points,
-                     between_samples, block, changes, directions, displaced, from_points, gather,
-                     moduli, place, products, put, scale_products, strains, stresses, take, times,
-                     to_rows)
+                     block, changes, components, directions, displaced, from_points, gather,
+                     between_samples, moduli, place, products, put, scale_products, strains,
+                     stresses, take, times, to_rows)
 from .compiled import W, CompiledTables
 from .increments import AT_START, evaluate_increment, of_block
 from .tables import HISTORY, LINEAR, conserve, evaluate_history, law_evaluate
@@ -271,7 +271,7 @@ def accept(t, u, v, out):
     R, m, memory = t.G.shape[0], t.G.shape[1], t.memory
     U, d, r = room((m, 2 * t.width)), room((R, 2 * t.width)), room((R, 2 * t.width))
     E, ne, points = room((t.pattern.rows.shape[1], t.width)), len(t.start), t.weights.shape[1]
-    n, k = len(t.along) // points, len(memory.history)
+    n, k = components(t), len(memory.history)
     S, x = np.empty((2, n + n * n, points, t.width)), np.empty((2, n, points, t.width))
     h, energy = np.empty((2, k, points, t.width)), np.empty((2, 1, points, t.width))
     for first in range(0, ne, W):
