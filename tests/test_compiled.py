@@ -137,6 +137,25 @@ def test_same_laws_with_a_history(law, element, mesh):
         assert_allclose(b, a, rtol=0, atol=1e-11 * np.abs(a).max())
 
 
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
+def test_a_law_that_overrides_a_method_of_a_compiled_one_runs_in_numpy(element):
+    class Softer(ElasticPlastic):
+        def evaluate(self, strain, history, dt):
+            S, D, after = super().evaluate(strain, history, dt)
+            return 0.5 * S, 0.5 * D, after
+
+        def axial(self, strain, history, dt):
+            S, D, after = super().axial(strain, history, dt)
+            return 0.5 * S, 0.5 * D, after
+
+    scenes = [Scene(Beam(MESHES["equal"](), element, law(**PLASTIC), 0.3)).clamp("left")
+              for law in (Softer, ElasticPlastic)]
+    assert [ways(scene) == ["plain"] * 2 for scene in scenes] == [True, False]
+    u = 1e-3 * np.random.default_rng(1).standard_normal(scenes[0].N)
+    half, whole = (scene.system.internal_force(u) for scene in scenes)
+    assert np.abs(half - whole).max() > 0.1 * np.abs(whole).max()
+
+
 @pytest.mark.parametrize("law", ["kinematic", "Prony"])
 @pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
 def test_same_runs_and_motions_of_laws_with_a_history(element, law):

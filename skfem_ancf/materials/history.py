@@ -22,6 +22,9 @@ LATERAL, CLOSE, ROUGH = 50, 1e-13, 1e-8
 TINY, SMALL, SPAN = 1e-30, 1e-3, 1.0
 
 
+#: Names of the functions of a point and of a fibre, and of the methods that they stand for.
+POINT = "point", "stored", "evaluate", "stress", "moduli", "energy"
+FIBRE = "fibre", "fibre_stored", "axial", "axial_energy"
 NO_VARIABLES: Mapping[str, int] = {}
 
 
@@ -49,7 +52,8 @@ class HistoryMaterial(Material):
     History variables are numbers at each integration point, zero at rest. They are a value that
     goes in and comes out: a law changes nothing in itself. A subclass defines :attr:`variables` and
     :meth:`stress`, which run in NumPy; or :attr:`variables`, the static methods :attr:`point` and
-    :attr:`stored`, and :attr:`constants`, which are compiled.
+    :attr:`stored`, and :attr:`constants`, which are compiled. A subclass that overrides a method of
+    such a law runs in NumPy.
 
     Strain (eps_xx, eps_yy, 2 eps_xy) and stress (S_xx, S_yy, S_xy) are those of
     :class:`~skfem_ancf.materials.base.Material`, shape (3, ...). E and nu are those of small
@@ -128,10 +132,15 @@ class HistoryMaterial(Material):
         """Moduli at rest, (3, 3): those of E and nu."""
         return hooke(self.E, self.nu, self.plane)
 
-    @property
-    def compiles(self) -> bool:
-        """True if the law, or that of its fibres, is a function of a point."""
-        return self.point is not None or self.fibre is not None
+    def functions(self, fibre: bool) -> tuple[Any, Any]:
+        """:attr:`point` and :attr:`stored`, or :attr:`fibre` and :attr:`fibre_stored`; None where a
+        subclass overrides what these are for."""
+        point, stored, *others = FIBRE if fibre else POINT
+        mro = type(self).__mro__
+        first = [next(k for k, one in enumerate(mro) if name in vars(one))
+                 for name in (point, *others)]
+        return (None, None) if min(first) < first[0] else (
+            getattr(self, point), getattr(self, stored))
 
     def rows(self, name: str) -> slice:
         """The rows of a variable in a history."""

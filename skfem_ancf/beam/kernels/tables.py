@@ -220,7 +220,7 @@ def points_of(t: StrainTables) -> tuple[Any, ...]:
         return ()
     law = _LAWS[t.law.handle]
     if t.law.kind == HISTORY:
-        return (law.fibre, law.fibre_stored) if t.kind == CABLE else (law.point, law.stored)
+        return law.functions(t.kind == CABLE)
     return (law.point if t.law.kind == POINTWISE else None,)
 
 
@@ -290,7 +290,9 @@ def law_tables(law: Any, owner: Any) -> LawTables:
         handle = next(_handles)
         _LAWS[handle] = law.material
         weakref.finalize(owner, _LAWS.pop, handle, None)
-        constants = law.material.constants if law.material.compiles else np.zeros(3)
+        constants = np.zeros(3)
+        if law.material.point is not None or law.material.fibre is not None:
+            constants = law.material.constants
         return LawTables(HISTORY, handle, 0, law.D.copy(), constants, law.scale)
     if isinstance(law, LinearLaw):
         return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
