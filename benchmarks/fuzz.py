@@ -547,7 +547,7 @@ def check(scene, state, before=None, tol=1e-5):
     gap = np.max(np.abs(system.constraints.constraint(u, now)), initial=0.0)
     if gap > 1e-9 * system.size:
         raise Wrong(f"a joint is open by {gap:.3g}")
-    held = u[system.constraints.fixed] - system.constraints.values(now)
+    held = u[system.constraints.fixed] - system.constraints.values(state.load, state.t)
     if np.max(np.abs(held), initial=0.0) > 1e-12 * system.size:
         raise Wrong("a support is not where it should be")
     return ("in contact" if touching else "with a slider" if forces.remembering else

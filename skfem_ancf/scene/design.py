@@ -507,7 +507,7 @@ def residual(system: Any, u: Array, multipliers: Array, load: float, memory: Any
     c, time = system.constraints, load if t is None else t
     rest = system.after(memory).internal_force(u, t, load) - load * system.external_force(u, t) + (
         c.sparse_jacobian(u, time).T @ multipliers)
-    rest[c.fixed] = u[c.fixed] - c.values(time)
+    rest[c.fixed] = u[c.fixed] - c.values(load, t)
     return np.concatenate([rest, c.constraint(u, time)])
 
 

@@ -419,7 +419,7 @@ class _MeanStep(_Step):
                                                       self._impulse))
         if system.damped:
             first = first + system.damping_force(self._middle, self._speed, self._t)
-        first[c.fixed] = c.values(y.t)
+        first[c.fixed] = c.values(1.0, y.t)
         return np.concatenate([
             first, c.constraint(y.u, y.t), M(y.v - self._velocity) + J.T @ self._impulse,
             _rate(INSTANT * self._h, system, y.u, y.v, y.t)])
