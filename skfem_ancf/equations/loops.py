@@ -146,8 +146,8 @@ def flat_after(flat: tuple[Equations, Packed, list[Packed]], plain: Equations
 def _with_memory(flat, body, words):
     """The words of a body whose elements have another history."""
     known, tables = {x.address: x for x in words}, []
-    for address_, e in zip(flat.of.packs, body.elements):
-        one = known[address_]
+    for place, e in zip(flat.of.packs, body.elements):
+        one = known[place]
         if e.t.law.kind == HISTORY:
             one = Packed(one.of._replace(memory=memory_of(e)))
             words.append(one)

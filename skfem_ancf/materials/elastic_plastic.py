@@ -12,6 +12,10 @@ from .history import ACROSS, HistoryMaterial
 from .return_mapping import (fibre, fibre_energy, hardened, locked, plane_strain,
                              plane_strain_energy, plane_stress, plane_stress_energy)
 
+#: Functions of a point and of a fibre, with their stored energies. Fibres in plane strain need a
+#: lateral strain, which is found in NumPy.
+FUNCTIONS = {"stress": (plane_stress, plane_stress_energy, fibre, fibre_energy),
+             "strain": (plane_strain, plane_strain_energy, None, None)}
 #: History variables of a point.
 VARIABLES = {"plastic_strain": 3, "back_stress": 3, "accumulated": 1}
 
@@ -32,6 +36,14 @@ class Voce(NamedTuple):
     saturation: float
     rate: float
     linear: float = 0.0
+
+
+def _by_plane(k: int) -> Any:
+    def function(self: Any) -> Any:
+        """One of :data:`FUNCTIONS`."""
+        return FUNCTIONS[self.plane][k]
+
+    return property(function)
 
 
 class ElasticPlastic(HistoryMaterial):
@@ -132,22 +144,7 @@ class ElasticPlastic(HistoryMaterial):
         return np.concatenate([[self.E, self.nu, self.kinematic, self.yield_stress, *h],
                                rows.ravel()])
 
-    @property
-    def point(self) -> Any:
-        return plane_stress if self.plane == "stress" else plane_strain
-
-    @property
-    def stored(self) -> Any:
-        return plane_stress_energy if self.plane == "stress" else plane_strain_energy
-
-    @property
-    def fibre(self) -> Any:
-        """None in plane strain, whose fibres need a lateral strain."""
-        return fibre if self.plane == "stress" else None
-
-    @property
-    def fibre_stored(self) -> Any:
-        return fibre_energy if self.plane == "stress" else None
+    point, stored, fibre, fibre_stored = map(_by_plane, range(4))
 
     def axial_energy(self, strain: Array, history: Array) -> Array:
         out = super().axial_energy(strain, history)

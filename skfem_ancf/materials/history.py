@@ -10,7 +10,7 @@ import numpy as np
 from ..core import (Array, ConvergenceError, InputError, Law, rebuilt, refuse, require_integer,
                     require_positive, require_slope)
 from .base import LinearLaw, Material, hooke
-from .pointwise import MODULI
+from .pointwise import MODULI, python
 
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle
 #: is right to 1 %; 20 points give 0.4 %, 10 points 1.5 %.
@@ -26,11 +26,6 @@ TINY, SMALL, SPAN = 1e-30, 1e-3, 1.0
 POINT = "point", "stored", "evaluate", "stress", "moduli", "energy"
 FIBRE = "fibre", "fibre_stored", "axial", "axial_energy"
 NO_VARIABLES: Mapping[str, int] = {}
-
-
-def python(function: Any) -> Any:
-    """A function in Python, of one that may be compiled."""
-    return getattr(function, "py_func", function)
 
 
 def real(x: Any) -> Array:

@@ -13,6 +13,11 @@ from .base import Material
 MODULI = 0, 1, 2, 1, 3, 4, 2, 4, 5
 
 
+def python(function: Any) -> Any:
+    """A function in Python, of one that may be compiled."""
+    return getattr(function, "py_func", function)
+
+
 class PointwiseMaterial(Material):
     """A law whose energy, stress and moduli are one function of the strain at a point.
 
@@ -79,7 +84,7 @@ class PointwiseMaterial(Material):
         """
         strain = np.asarray(strain)
         strain = strain.astype(np.result_type(strain, float), copy=False)
-        energy, stress, moduli = getattr(self.point, "py_func", self.point)(self.constants, *strain)
+        energy, stress, moduli = python(self.point)(self.constants, *strain)
         found = [energy] if number == 1 else [*stress, *(moduli[k] for k in MODULI)]
         found = found[3:] if number == 9 else found[:number]
         out = np.empty((number, *strain.shape[1:]), strain.dtype)

@@ -68,17 +68,21 @@ def relaxing(c, strain, history, dt, S, D, after):
 
 
 @source
-def stored(c, strain, history):
-    """Stored energy at a point: of the law, and of the springs of the Maxwell elements."""
-    out = square(c[MODULI:], strain[0], strain[1], strain[2])
-    lasting = 1.0
-    for k in range(SHARES, len(c), 2):
-        lasting -= c[k]
-    out = lasting * out
+def of_springs(c, W, history):
+    """Stored energy: of the law, which has W, and of the springs of the Maxwell elements."""
+    lasting, out = 1.0, 0.0
     for k in range(SHARES, len(c), 2):
         j = 3 * (k - SHARES) // 2 + 3
-        out = out + square(c[COMPLIANCE:], history[j], history[j + 1], history[j + 2]) / c[k]
-    return 0.5 * out
+        lasting -= c[k]
+        out = out + 0.5 / c[k] * square(
+            c[COMPLIANCE:], history[j], history[j + 1], history[j + 2])
+    return lasting * W + out
+
+
+@source
+def stored(c, strain, history):
+    """Stored energy at a point."""
+    return of_springs(c, 0.5 * square(c[MODULI:], strain[0], strain[1], strain[2]), history)
 
 
 @source
@@ -93,15 +97,8 @@ def relaxing_fibre(c, strain, history, dt, S, D, after):
 
 @source
 def stored_fibre(c, strain, history):
-    """Stored energy of a fibre."""
-    out, lasting = c[AXIAL] * strain[0] * strain[0], 1.0
-    for k in range(SHARES, len(c), 2):
-        lasting -= c[k]
-    out = lasting * out
-    for k in range(SHARES, len(c), 2):
-        stress = history[3 * (k - SHARES) // 2 + 3]
-        out = out + stress * stress / (c[k] * c[AXIAL])
-    return 0.5 * out
+    """Stored energy of a fibre, whose stresses across are zero."""
+    return of_springs(c, 0.5 * c[AXIAL] * strain[0] * strain[0], history)
 
 
 class Prony(HistoryMaterial):
@@ -201,5 +198,4 @@ class Prony(HistoryMaterial):
         """That of the springs: of the law, and of those that relax with its moduli at rest."""
         if self.stored is not None:
             return super().energy(strain, history)
-        return (1.0 - self.shares.sum()) * self._law.energy(strain) + stored(
-            self.constants, 0.0 * strain, history)
+        return of_springs(self.constants, self._law.energy(strain), history)

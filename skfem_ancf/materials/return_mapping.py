@@ -99,25 +99,19 @@ def multiplier(c, plastic, squares, A, p):
 
 
 @source
-def trial_plane_stress(c, strain, history):
-    """Trial stress less back stress in the components (xx + yy, xx - yy, xy) over sqrt(2), sqrt(2),
-    1, in which the moduli are diagonal, and the square of f."""
-    G, a, b = 0.5 * c[E] / (1.0 + c[NU]), strain[0] - history[0], strain[1] - history[1]
-    x = HALF * (c[E] / (1.0 - c[NU]) * (a + b) - history[3] - history[4])
-    y = HALF * (2.0 * G * (a - b) - history[3] + history[4])
-    z = G * (strain[2] - history[2]) - history[5]
-    return x, y, z, x * x / 3.0 + y * y + 2.0 * z * z
-
-
-@source
 def plane_stress(c, strain, history, dt, S, D, after):
     """Stress, moduli and history of plane stress."""
+    # x, y, z are the trial stress less back stress in the components (xx + yy, xx - yy, xy) over
+    # sqrt(2), sqrt(2), 1, in which the moduli are diagonal.
     G, H, p = 0.5 * c[E] / (1.0 + c[NU]), 2.0 / 3.0 * c[KINEMATIC], history[6]
     X, Y, Z = c[E] / (1.0 - c[NU]), 2.0 * G, G
-    x, y, z, square = trial_plane_stress(c, strain, history)
+    a, b = strain[0] - history[0], strain[1] - history[1]
+    x = HALF * (X * (a + b) - history[3] - history[4])
+    y = HALF * (Y * (a - b) - history[3] + history[4])
+    z = Z * (strain[2] - history[2]) - history[5]
     for k in range(len(history)):
         after[k] = history[k]
-    plastic = yields(c, square, p)
+    plastic = yields(c, x * x / 3.0 + y * y + 2.0 * z * z, p)
     if somewhere(plastic):
         A, B, C = X / 3.0 + H, Y + H, 2.0 * Z + H
         g, f, K = multiplier(c, plastic, (x * x / 3.0, y * y, 2.0 * z * z), (A, B, C), p)
@@ -165,18 +159,12 @@ def deviators(c, strain, history):
 
 
 @source
-def trial_plane_strain(c, strain, history):
-    """Volumetric strain, trial deviators xx, yy and xy less back stress, and the square of f."""
-    volume, x, y, s, z = deviators(c, strain, history)
-    x, y, s, z = x - history[3], y - history[4], s - history[5], z + history[3] + history[4]
-    return volume, x, y, s, x * x + y * y + 2.0 * s * s + z * z
-
-
-@source
 def plane_strain(c, strain, history, dt, S, D, after):
     """Stress, moduli and history of plane strain: radial return."""
     G, bulk, H = 0.5 * c[E] / (1.0 + c[NU]), c[E] / (3.0 - 6.0 * c[NU]), 2.0 / 3.0 * c[KINEMATIC]
-    volume, x, y, s, square = trial_plane_strain(c, strain, history)
+    volume, x, y, s, z = deviators(c, strain, history)
+    x, y, s, z = x - history[3], y - history[4], s - history[5], z + history[3] + history[4]
+    square = x * x + y * y + 2.0 * s * s + z * z
     for k in range(len(history)):
         after[k] = history[k]
     one, n = 1.0 + 0.0 * square, 0.0 * square
@@ -212,16 +200,10 @@ def plane_strain_energy(c, strain, history):
 
 
 @source
-def trial_fibre(c, strain, history):
-    """Trial stress less back stress, and the square of f."""
-    x = c[E] * (strain[0] - history[0]) - history[3]
-    return x, 2.0 / 3.0 * x * x
-
-
-@source
 def fibre(c, strain, history, dt, S, D, after):
     """Stress, modulus and history of a fibre in uniaxial stress."""
-    H, (x, square) = c[KINEMATIC], trial_fibre(c, strain, history)
+    H, x = c[KINEMATIC], c[E] * (strain[0] - history[0]) - history[3]
+    square = 2.0 / 3.0 * x * x
     for k in range(len(history)):
         after[k] = history[k]
     plastic = yields(c, square, history[6])

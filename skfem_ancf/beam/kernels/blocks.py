@@ -281,7 +281,7 @@ def mean_with_history(t, first, E, change, T):
     for end in range(ends):
         a, b, c = x.ravel(), half.ravel(), y.ravel()
         for k in range(len(a)):
-            c[k] = a[k] + (0.5 - end) * b[k] * (ends - 1)
+            c[k] = a[k] + (0.5 - end) * b[k]
         evaluate_increment(t, first, y, AT_START if end == 1 else m.span[0], both, after)
         a, b = S.ravel(), both.ravel()
         for k in range(len(a)):
