@@ -695,7 +695,8 @@ def check_pressed(system, state, before, internal):
     if np.any(N < -tiny) or np.any(np.abs(T) > most * (1.0 + 1e-7) + tiny):
         raise Wrong("a force of contact is outside the cone of friction")
     slips = ~np.asarray(on.sticking, bool) & (N > 1e-3 * N.max())
-    if one.friction and np.any(np.abs(np.abs(T) - most)[slips] > 1e-5 * most.max()):
+    # round-off of positions, about 1e-14 of the size, on springs that have hardened
+    if one.friction and np.any(np.abs(np.abs(T) - most)[slips] > 1e-4 * most.max()):
         raise Wrong("a point slips, and friction is not at its limit")
 
 
@@ -793,7 +794,10 @@ def _compared(script, state, error):
     if plain_error != error:
         if plain is not None:
             check(scene, *plain)
-        return "" if "ConvergenceError" in (error, plain_error) else (
+        # Newton's method alone finds by chance, or not, how a pendulum hangs: see SupportError
+        chance = "ConvergenceError" in (error, plain_error) or (
+            "'newton'" in script and "SupportError" in (error, plain_error))
+        return "" if chance else (
             f"compiled: {error or 'solved'}, in NumPy: {plain_error or 'solved'}")
     if plain is None:
         return ""
