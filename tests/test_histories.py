@@ -110,6 +110,28 @@ def test_a_bar_hardens_as_its_table_says(plane):
     assert_allclose(S[0], c * np.interp(history[6, 0], *table.T), rtol=1e-3)
 
 
+@pytest.mark.parametrize("hardening", HARDENING, ids=["perfect", "linear", "Voce", "table"])
+def test_a_fibre_in_plane_strain_is_a_point_without_lateral_stress(hardening):
+    """Through cycles, with back stress: stress, modulus, all history variables, stored energy."""
+    law, rng = ElasticPlastic(E, NU, YIELD, hardening, 5e9, plane="strain"), (
+        np.random.default_rng(3))
+    history = np.zeros((7, 20))
+    for _ in range(4):
+        strain = 5e-3 * rng.standard_normal(20)
+        S, D, after = law.axial(strain, history, 0.0)
+        full = np.array([strain, 0.0 * strain, 0.0 * strain])
+        for _ in range(40):
+            stress, moduli, found = law.evaluate(full, history, 0.0)
+            full[1] -= stress[1] / moduli[1, 1]
+        assert_allclose(stress[1:], 0.0, atol=1e-12 * YIELD)
+        assert_allclose(S, stress[0], atol=1e-11 * YIELD)
+        assert_allclose(D, moduli[0, 0] - moduli[0, 1] * moduli[1, 0] / moduli[1, 1], rtol=1e-9)
+        for rows, size in ((slice(0, 3), KAPPA * H), (slice(3, 6), YIELD), (6, KAPPA * H)):
+            assert_allclose(after[rows], found[rows], atol=1e-11 * size)
+        assert_allclose(law.axial_energy(strain, after), law.energy(full, found), rtol=1e-11)
+        history = after
+
+
 def test_dissipated_work_is_not_negative_and_what_is_stored_comes_back():
     law, rng = ElasticPlastic(E, NU, YIELD, Voce(1e8, 50.0), 4e9), np.random.default_rng(2)
     way, n, history = 8e-3 * rng.standard_normal((3, 30)), 1000, np.zeros((7, 30))
@@ -392,11 +414,13 @@ def test_a_column_buckles_at_its_tangent_modulus_load():
     assert sides.max() > 2.0 * before and sides.min() < 1.2 * before
 
 
-@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)], ids=name)
-def test_work_is_stored_or_dissipated(element):
+@pytest.mark.parametrize("element, plane", [
+    (ElementBeamCable(5), "stress"), (ElementBeamCable(5), "strain"),
+    (ElementBeamANCF(2), "stress")], ids=str)
+def test_work_is_stored_or_dissipated(element, plane):
     """Of the moment on a bent strip, to 1e-6: bent, bent back, and through."""
     top = 3.0 * KAPPA * L
-    law = ElasticPlastic(E, NU, YIELD, 1e-2 * E, 1e-2 * E)
+    law = ElasticPlastic(E, NU, YIELD, 1e-2 * E, 1e-2 * E, plane=plane)
     _, run = bent(element, law, [0.0, top, -top], (0.0, 1.0, 2.0), 60)
     M, angle = (np.array(x) for x in zip(*((
         state.multipliers[0], np.interp(t, [0.0, 1.0, 2.0], [0.0, top, -top]))

@@ -73,9 +73,6 @@ class Backend:
             self._plain = "compiled=False"
         elif system.forces.contacts.custom:
             self._plain = "a user-defined distance (SignedDistance)"
-        elif any(pack.law.kind == HISTORY and pack.along.ndim > 2
-                 for pack in self.tables.plain.body.packs):
-            self._plain = "a cable of varying height with a law that has a history"
         elif any(None in points_of(pack) for pack in self.tables.plain.body.packs):
             self._plain = ("a user-defined law in Python; a PointwiseMaterial, or a "
                            "HistoryMaterial with a method point, is compiled")

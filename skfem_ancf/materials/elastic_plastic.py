@@ -9,13 +9,14 @@ import numpy as np
 from ..core import (Array, ArrayLike, refuse, require_finite, require_not_negative,
                     require_positive)
 from .history import ACROSS, HistoryMaterial
-from .return_mapping import (fibre, fibre_energy, hardened, locked, plane_strain,
-                             plane_strain_energy, plane_stress, plane_stress_energy)
+from .return_mapping import (fibre, fibre_energy, hardened, plane_strain, plane_strain_energy,
+                             plane_strain_fibre, plane_strain_fibre_energy, plane_stress,
+                             plane_stress_energy)
 
-#: Functions of a point and of a fibre, with their stored energies. Fibres in plane strain need a
-#: lateral strain, which is found in NumPy.
+#: Functions of a point and of a fibre, with their stored energies.
 FUNCTIONS = {"stress": (plane_stress, plane_stress_energy, fibre, fibre_energy),
-             "strain": (plane_strain, plane_strain_energy, None, None)}
+             "strain": (plane_strain, plane_strain_energy, plane_strain_fibre,
+                        plane_strain_fibre_energy)}
 #: History variables of a point.
 VARIABLES = {"plastic_strain": 3, "back_stress": 3, "accumulated": 1}
 
@@ -145,10 +146,6 @@ class ElasticPlastic(HistoryMaterial):
                                rows.ravel()])
 
     point, stored, fibre, fibre_stored = map(_by_plane, range(4))
-
-    def axial_energy(self, strain: Array, history: Array) -> Array:
-        out = super().axial_energy(strain, history)
-        return out if self.plane == "stress" else out + locked(self.constants, history)
 
     def out_of_plane(self, strain: Array, history: Array, stress: Array) -> tuple[Array, Array]:
         e, S = super().out_of_plane(strain, history, stress)

@@ -16,30 +16,21 @@ AXIAL, MODULI, COMPLIANCE, SHARES = 0, 1, 7, 13
 
 
 @source
-def fraction(c, dt):
-    """The derivative of the stress by that of the law, for a constant rate over an increment."""
-    out = 1.0
-    for k in range(SHARES, len(c), 2):
-        out += c[k] * (mean(dt / c[k + 1]) - 1.0)
-    return out
-
-
-@source
-def mean(x):
-    """What remains at the end of a change at a constant rate, over x relaxation times."""
-    return -np.expm1(-x) / x if x > 0.0 else 1.0
-
-
-@source
 def relax(c, history, dt, S, after):
-    """Relax stresses S (1 or 3, ...) of the law in an increment."""
+    """Relax stresses S (1 or 3, ...) of the law in an increment. Returns the derivative by the
+    stresses of the law, for a constant rate over the increment."""
+    part = 1.0
     for i in range(len(S)):
-        now = 1.0 * S[i]
-        change, after[i] = now - history[i], now
-        for k in range(SHARES, len(c), 2):
-            j = 3 * (k - SHARES) // 2 + 3 + i
-            after[j] = np.exp(-dt / c[k + 1]) * history[j] + c[k] * mean(dt / c[k + 1]) * change
-            S[i] += after[j] - c[k] * now
+        after[i] = S[i]
+    for k in range(SHARES, len(c), 2):
+        x, j = dt / c[k + 1], 3 * (k - SHARES) // 2 + 3
+        lost = -np.expm1(-x)
+        mean = lost / x if x > 0.0 else 1.0  # what remains at the end of a change at this rate
+        part += c[k] * (mean - 1.0)
+        for i in range(len(S)):
+            after[j + i] = (1.0 - lost) * history[j + i] + c[k] * mean * (after[i] - history[i])
+            S[i] += after[j + i] - c[k] * after[i]
+    return part
 
 
 @source
@@ -61,8 +52,7 @@ def square(D, x, y, z):
 def relaxing(c, strain, history, dt, S, D, after):
     """Stress, moduli and history at a point."""
     product(c[MODULI:], strain, S)
-    relax(c, history, dt, S, after)
-    part = fraction(c, dt)
+    part = relax(c, history, dt, S, after)
     for k in range(6):
         D[k] = part * c[MODULI + k]
 
@@ -91,8 +81,7 @@ def relaxing_fibre(c, strain, history, dt, S, D, after):
     S[0] = c[AXIAL] * strain[0]
     for k in range(len(history)):
         after[k] = history[k]
-    relax(c, history, dt, S, after)
-    D[0] = fraction(c, dt) * c[AXIAL]
+    D[0] = relax(c, history, dt, S, after) * c[AXIAL]
 
 
 @source
@@ -192,7 +181,7 @@ class Prony(HistoryMaterial):
         return S, after
 
     def moduli(self, strain: Array, history: Array, dt: float) -> Array:  # type: ignore[override]
-        return fraction(self.constants, dt) * self._law.moduli(strain)
+        return relax(self.constants, (), dt, (), ()) * self._law.moduli(strain)
 
     def energy(self, strain: Array, history: Array) -> Array:  # type: ignore[override]
         """That of the springs: of the law, and of those that relax with its moduli at rest."""

@@ -226,3 +226,30 @@ def fibre_energy(c, strain, history):
     """Stored energy of a fibre."""
     elastic = strain[0] - history[0]
     return 0.5 * c[E] * elastic * elastic + locked(c, history)
+
+
+@source
+def across_width(history):
+    """A history with zz in place of yy, as :func:`plane_stress` has it: plastic strains have no
+    trace, and of the back stress that of yy is zero, as stress is."""
+    a, b = history[0], history[3] - history[4]
+    return a, -a - history[1], 0.0 * a, b, -history[3] - 2.0 * history[4], 0.0 * b, history[6]
+
+
+@source
+def plane_strain_fibre(c, strain, history, dt, S, D, after):
+    """Stress, modulus and history of a fibre in plane strain: :func:`plane_stress` of its length
+    and the width, in which it has no strain."""
+    e, size = strain[0], strain.shape[1:]
+    stress, moduli = np.empty((3, *size)), np.empty((6, *size))
+    plane_stress(c, (e, 0.0 * e, 0.0 * e), across_width(history), dt, stress, moduli, after)
+    S[0], D[0] = stress[0], moduli[0]
+    after[1], after[4] = -after[0] - after[1], -(after[3] + after[4]) / 3.0
+    after[3] += after[4]
+
+
+@source
+def plane_strain_fibre_energy(c, strain, history):
+    """Stored energy of a fibre in plane strain."""
+    e = strain[0]
+    return plane_stress_energy(c, (e, 0.0 * e, 0.0 * e), across_width(history))

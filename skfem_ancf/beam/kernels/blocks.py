@@ -212,8 +212,8 @@ def times(pairs, H, E, T):
 def at_points(t, first, E):
     """Strains at the integration points, (3 or, of fibres, 1, points, W)."""
     x, out = E.copy(), np.empty((components(t), t.weights.shape[1], t.width))
-    if len(t.sigma) > 0:
-        multiply(block(t.sigma, first), x)
+    if len(t.reach) > 0:
+        multiply(block(t.reach, first), x)
     product(t.along.rows, t.along.columns, t.along.values, x, shaped(
         out, (len(out) * out.shape[1], t.width)))
     return out
@@ -242,8 +242,8 @@ def from_points(t, first, S, T):
     for c in range(len(S)):
         multiply(w, S[c])
     product(A.columns, A.rows, A.values, shaped(S, (len(S) * len(w), t.width)), T)
-    if len(t.sigma) > 0:
-        multiply(block(t.sigma, first), T)
+    if len(t.reach) > 0:
+        multiply(block(t.reach, first), T)
 
 
 @source
@@ -320,9 +320,10 @@ def between_samples(t, first, M, H):
     for c in range(len(M)):
         multiply(w, M[c])
     product(A.rows, A.columns, A.values, shaped(M, (len(M) * len(w), t.width)), H)
-    if len(t.sigma) > 0:
+    if len(t.reach) > 0:
+        x = block(t.reach, first)
         for q in range(len(H)):
-            a, b, h = block(t.sigma, first)[pairs[0, q]], block(t.sigma, first)[pairs[1, q]], H[q]
+            a, b, h = x[pairs[0, q]], x[pairs[1, q]], H[q]
             for e in range(t.width):
                 h[e] *= a[e] * b[e]
 

@@ -94,6 +94,7 @@ class CompiledTables(NamedTuple):
     used: I1  # which of these are not zero, (rows m,)
     D: F3  # factors of the unknowns, (n, m, W), or empty
     sigma: F3  # factors of the strains, (n, ns, W), or empty
+    reach: F3  # the same for integration points
     x: F3  # rows in the reference configuration, (n, rows, 2 W)
     rest: F3  # of cables: |r_X| and curvature there, (n, points, 2 W), or empty
     H: F3  # weighted moduli, (n, nq, W)
@@ -118,13 +119,13 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
 
     G, R, D = scaled(each(t.G, OF_G))
     own, frame, H = len(G) > 1, each(t.frame, OF_FRAME), each(t.H, OF_H)
-    scales = _NOTHING, _NOTHING
+    scales, reach = (_NOTHING, _NOTHING), each(t.reach, OF_WEIGHTS)
     if len(R) > 1 and not own:
         (g, h), n, (a, b) = pattern.rows, pattern.ns // 2, pattern.pairs
         sigma = R[:, g] * R[:, h] if section else np.concatenate(
             [R[:, g[:n]], R[:, h[n:]] / R[:, g[n:]]], axis=1)
         frame, H = frame / R[:, :, None], H * sigma[:, a] * sigma[:, b]
-        scales = _scales(D), _scales(sigma)
+        scales, reach = (_scales(D), _scales(sigma)), sigma * reach if reach.size else sigma
     K, Z, coupled = _constant(each(t.C, OF_C), D)
     P, Q = map(np.ascontiguousarray, _products(G[0], pattern.products, own))
     along, mixing = map(_sparse, (
@@ -132,9 +133,9 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
         compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
-        _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
-        _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled, t.law, along,
-        _blocks(each(t.weights, OF_WEIGHTS)), mixing, _NO_MEMORY)
+        _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _scales(reach),
+        _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled,
+        t.law, along, _blocks(each(t.weights, OF_WEIGHTS)), mixing, _NO_MEMORY)
 
 
 def _sparse(A):

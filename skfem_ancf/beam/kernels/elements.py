@@ -212,16 +212,20 @@ class Elements:
         """Weights of the integration points of nonlinear laws, (points, ne or 1)."""
         return self._last(self.t.weights, OF_WEIGHTS)
 
+    @cached_property
+    def reach(self) -> Array | None:
+        """Factors of the samples for fibres (ns, ne or 1), or None."""
+        return self._last(self.t.reach, OF_WEIGHTS) if self.t.reach.size else None
+
     def at_points(self, strain: Array) -> Array:
         """Strains (3 or, of fibres, 1, points, ne) at the integration points."""
-        along = self.t.along  # of each element where the height of a cable varies
-        E = along @ strain if along.ndim == 2 else np.einsum("eps,se->pe", along, strain)
+        E = self.t.along @ (strain if self.reach is None else self.reach * strain)
         return E.reshape(-1, self.t.weights.shape[1], self.ne)
 
     def _weighted(self, S):
         """Stresses of the samples from those at the points."""
-        along, S = self.t.along, (S * self.weights).reshape(-1, self.ne)
-        return along.T @ S if along.ndim == 2 else np.einsum("eps,pe->se", along, S)
+        T = self.t.along.T @ (S * self.weights).reshape(-1, self.ne)
+        return T if self.reach is None else self.reach * T
 
     def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
                ) -> Array:
@@ -246,17 +250,13 @@ class Elements:
 
     @cached_property
     def _to_moduli(self):
-        """Sparse matrix from moduli at the points (9 points) to those between samples (nq), or one
-        of each element where the height of a cable varies."""
-        if self.t.along.ndim > 2:
-            (s, z), along = self.t.pairs, self.t.along
-            return along[:, :, s] * along[:, :, z]
+        """Sparse matrix from moduli at the points (9 points) to those between samples (nq)."""
         return to_moduli(self.t)
 
     def _moduli_of_samples(self, D):
         """Moduli (nq, ne) between samples from those at the points, as if they were symmetric."""
-        M, D = self._to_moduli, (D * self.weights).reshape(-1, self.ne)
-        return M @ D if self.t.along.ndim == 2 else np.einsum("epq,pe->qe", M, D)
+        D = self._to_moduli @ (D * self.weights).reshape(-1, self.ne)
+        return D if self.reach is None else self.reach[self.t.pairs].prod(axis=0) * D
 
     def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
         """Weighted stresses (ns, ne), and moduli (nq, ne) between samples."""

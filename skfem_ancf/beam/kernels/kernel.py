@@ -310,8 +310,8 @@ def remembering(elements: Sequence[Elements], past: Past) -> list[Elements]:
 #: Relative difference of strains that is round-off.
 SAME = 1e-12
 #: What copies of elements share.
-CONSTANT = ("weights", "constant", "_G_ends", "_to_moduli", "_ends", "_products", "_signs",
-            "_at_band")
+CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_ends", "_products",
+            "_signs", "_at_band")
 
 
 class ElementsWithHistory(Elements):
@@ -416,9 +416,11 @@ def fibre_points(layer: Any, xi: Array) -> tuple[Array, Array]:
     return w, np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
 
 
-def fibres(across: Any, layer: Any, xi: Array, tind: Array | None) -> tuple[Array, Array]:
-    """Distances from the axis and areas at points xi (n,) of elements, (ne or 1, n, m)."""
+def fibres(across: Any, layer: Any, xi: Array, tind: Array | None) -> tuple[Array, Array, Array]:
+    """Distances from the axis over the height (m,), heights (ne or 1, n) and areas (ne or 1, n, m)
+    at points xi (n,) of elements."""
     w, X = fibre_points(layer, xi)
-    h = across.heights(X[0], tind)
-    Y, A = (X[1] - 0.5) * h, np.tile(w, len(xi)) * h * across.breadth(layer, X, tind)
-    return tuple((x + np.zeros((1, X.shape[1]))).reshape(-1, len(xi), len(w)) for x in (Y, A))
+    n, m = len(xi), len(w)
+    h = across.heights(X[0], tind) + np.zeros((1, n * m))
+    A = (np.tile(w, n) * h * across.breadth(layer, X, tind)).reshape(-1, n, m)
+    return X[1, :m] - 0.5, h.reshape(-1, n, m)[..., 0], A

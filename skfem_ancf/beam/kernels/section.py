@@ -90,7 +90,7 @@ class SectionKernel(ElementKernel):
         self.tables.append(StrainTables(
             pattern_of(SECTION, samples.rows, pairs), nb * self.t[0].astype(np.int64),
             np.arange(ne)[:, None] * each, *map(np.ascontiguousarray, (G, frame, H, C)), law,
-            along, np.ascontiguousarray(weights)))
+            along, np.ascontiguousarray(weights), np.zeros((len(weights), 0))))
         return samples, volumes
 
     @property
@@ -305,7 +305,7 @@ class CableKernel(ElementKernel):
         return StrainTables(
             pattern, nb * mesh.t[0].astype(np.int64), np.arange(ne)[:, None] * each,
             *map(np.ascontiguousarray, (G[:, :, 1:], frame, H, C)),
-            NO_LAW, np.zeros((0, 2 * n)), np.zeros((1, 0)))
+            NO_LAW, np.zeros((0, 2 * n)), *np.zeros((2, 1, 0)))
 
     def _with_fibres(self, mesh, element, same):
         """A table of fibres for each layer."""
@@ -320,23 +320,23 @@ class CableKernel(ElementKernel):
             L, tind = L[:1], np.zeros(1, int)
         (pattern, order), out = _samples(n, 3), []
         for layer in across.layers:
-            Y, A = fibres(across, layer, self.points, tind)
-            every = np.repeat(np.eye(n), Y.shape[2], 0)
-            along = np.concatenate([np.broadcast_to(every, (len(Y), *every.shape)),
-                                    -Y.reshape(len(Y), -1, 1) * every], axis=2)
-            along = along[0] if len(along) == 1 else along
+            y, h, A = fibres(across, layer, self.points, tind)
+            Y, every = h[..., None] * y, np.repeat(np.eye(n), len(y), 0)
+            along = np.concatenate([every, -np.tile(y, n)[:, None] * every], axis=1)
             weights = L * (self._rule[1][:, None] * A).reshape(len(A), -1)
+            reach = np.concatenate([np.ones_like(h), h], axis=1) + np.zeros((len(weights), 1))
             E = layer.material.axial_modulus
             H = np.concatenate([E * np.sum(A * Y**k, axis=-1) * (-1.0) ** k * L * self._rule[1]
                                 for k in (0, 2, 1)], axis=1)
             law = law_tables(layer.material.law(), self)
             if law.kind == LINEAR:
-                along, weights = np.zeros((0, 2 * n)), np.zeros((1, 0))
+                along, (weights, reach) = np.zeros((0, 2 * n)), np.zeros((2, 1, 0))
             at = whole.at.copy()
             at[:, OF_WEIGHTS] = np.arange(len(at)) if len(weights) > 1 else 0
             out.append(whole._replace(
                 at=at, pattern=pattern, H=np.ascontiguousarray(H[:, order]),
-                C=whole.C[:0] if out else whole.C, law=law, along=along, weights=weights))
+                C=whole.C[:0] if out else whole.C, law=law, along=along, weights=weights,
+                reach=reach))
         return out
 
     def _frame(self, mesh, element, n, G):

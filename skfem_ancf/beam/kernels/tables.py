@@ -94,6 +94,7 @@ class StrainTables(NamedTuple):
     law: LawTables
     along: F2  # for nonlinear laws: from samples to integration points, (3 points, ns)
     weights: F2  # for nonlinear laws: weights of the points, (k, points)
+    reach: F2  # for fibres: factors of the samples before ``along``, (k, ns); (k, 0) if all are 1
 
     @property
     def kind(self) -> int:
@@ -153,8 +154,8 @@ def together(tables: Sequence[StrainTables]) -> StrainTables:
     names = "G", "frame", "H", "C", "weights"  # in the order of the columns of ``at``
     sizes = np.array([[len(getattr(t, name)) for name in names] for t in tables])
     before = np.cumsum(sizes, axis=0) - sizes
-    parts: dict[str, Any] = {
-        name: np.concatenate([getattr(t, name) for t in tables]) for name in (*names, "start")}
+    parts: dict[str, Any] = {name: np.concatenate([getattr(t, name) for t in tables])
+                             for name in (*names, "reach", "start")}
     return first._replace(
         at=np.concatenate([t.at + k for t, k in zip(tables, before)]), **parts)
 
