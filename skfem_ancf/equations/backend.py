@@ -10,7 +10,7 @@ from functools import partial
 from threading import RLock
 from typing import Any, NamedTuple
 
-from ..beam.kernels.tables import HISTORY, points_of
+from ..beam.kernels.tables import points_of
 from ..core import Array, announced_bar, cached_property, code_cache, deferred, raise_kept
 from ..core.code_cache import compiled_off, compiled_setting
 from .tables import Tables
