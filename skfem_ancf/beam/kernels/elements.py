@@ -88,9 +88,14 @@ def _to_rows(terms: bytes, rows: int) -> Any:
 def to_moduli(t: StrainTables) -> Any:
     """Sparse matrix from moduli at the points (9 points, of fibres points) to those between samples
     (nq)."""
+    return _to_moduli(t.pattern, t.weights.shape[1], t.along.tobytes())
+
+
+@lru_cache(64)
+def _to_moduli(pattern, points, along):
     from scipy import sparse
 
-    (s, z), A = t.pairs, t.along.reshape(-1, t.weights.shape[1], t.along.shape[1])
+    (s, z), A = pattern.pairs, np.frombuffer(along).reshape(-1, points, pattern.ns)
     c, n = np.abs(A).sum(axis=1).argmax(axis=0), len(A)  # component of each sample
     M = np.zeros((len(s), n * n, A.shape[1]))
     M[np.arange(len(s)), n * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
