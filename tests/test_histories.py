@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, Circle, ConvergenceError, ElasticPlastic, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, Frame, InputError, KelvinVoigt,
-                        MeshBeam, Prony, Scene, Section, StVenantKirchhoff, Voce)
+                        MeshBeam, ModelWarning, Prony, Scene, Section, StVenantKirchhoff, Voce)
 from skfem_ancf.materials import HistoryMaterial
 
 E, NU, YIELD, H, B, L = 2e11, 0.3, 2.5e8, 0.01, 0.01, 0.1
@@ -538,6 +538,26 @@ def test_a_bar_hit_hard_stays_bent(scheme):
     assert w[-50:].min() > 0.5 * w.max() and v[-50:].min() < 0.1 * v.max()
 
 
+@pytest.mark.parametrize("scheme", ["gauss", "radau"])
+def test_collocation_says_where_yielding_brings_energy_in(scheme):
+    """In steps that do not resolve the waves of stress; others agree with "energy-momentum"."""
+    steel = ElasticPlastic(E, NU, YIELD, 1e-2 * E, density=7800.0)
+    with pytest.warns(ModelWarning, match="brought in .* of the energy.*'energy-momentum'"):
+        thrown(steel).integrate(2e-4, 1e-5, scheme=scheme)
+    fine = thrown(steel).integrate(2e-5, 1e-6, scheme=scheme)
+    right = thrown(steel).integrate(2e-5, 1e-6)
+    tip = (0.2, 0.0)
+    assert_allclose(fine.displacement(tip)[-1], right.displacement(tip)[-1], rtol=1e-3, atol=1e-9)
+
+
+def test_a_named_material_yields_at_its_strength():
+    steel = ElasticPlastic.named("S235", ("N", "mm"), hardening=1000.0)
+    assert (steel.yield_stress, steel.hardening, steel.title) == (235.0, 1000.0, "S235")
+    assert ElasticPlastic.named("S355", yield_stress=3.4e8).yield_stress == 3.4e8
+    with pytest.raises(InputError, match="S235"):
+        ElasticPlastic.named("S234")
+
+
 @pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)], ids=name)
 def test_an_iteration_evaluates_the_law_once(element):
     """The mixed iteration linearises where the last tangent was."""
@@ -732,6 +752,8 @@ def test_what_cannot_be_is_said():
     for shares, times, text in (([0.6, 0.5], [1.0, 2.0], "below 1"), ([0.5], [-1.0], "times")):
         with pytest.raises(InputError, match=text):
             Prony(StVenantKirchhoff(E, NU), shares, times)
+    with pytest.raises(InputError, match=r"table \(n, 2\) or Voce\(saturation, rate\), got 'voce'"):
+        ElasticPlastic(E, NU, YIELD, hardening="voce")
     with pytest.raises(InputError, match="must be elastic"):
         Prony(steel, [0.5], [1.0])
     with pytest.raises(InputError, match="number for E"):

@@ -431,6 +431,15 @@ def test_what_does_not_fit_is_said():
         Scene(line(1.0, 4, 0.01)).contact()
     with pytest.raises(InputError, match="no contact"):
         scene.state().contact()
+    with pytest.raises(InputError, match="unknown beam 'al'; known: 'all'"):
+        scene.contact("al")
+    top = Scene(line(1.0, 4, 0.01), line(1.0, 4, 0.01, (0.0, -0.02))).contact("all").state()
+    with pytest.raises(InputError, match=r"unknown member 'top'; known: 0, 1"):
+        top.contact(on="top")
+    with pytest.raises(InputError, match="has no obstacle"):
+        top.contact(0)
+    with pytest.raises(InputError, match=r"state.contact\(on=...\) has pressure"):
+        top.field("pressure", (0.5, 0.0))
     apart = Scene(line(1.0, 4, 0.01), line(1.0, 4, 0.01, (0.0, -0.1))).clamp("left", 0)
     with pytest.raises(InputError, match="use 'energy-momentum'"):
         apart.clamp("left", 1).contact("all").integrate(1e-3, 1e-3, scheme="radau")

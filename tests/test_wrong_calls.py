@@ -134,6 +134,13 @@ def test_a_wrong_call_is_explained(call, says):
         call()
 
 
+def test_a_motion_that_ends_before_it_starts_is_said():
+    scene = clamped().gravity((0, -1))
+    state = scene.run(2.0, increments=1).state(-1)
+    with pytest.raises(InputError, match=r"no duration; got t_end = 0.1, t_start = 2"):
+        scene.integrate(0.1, 0.01, start=state)
+
+
 def test_a_step_longer_than_the_motion_is_said():
     with pytest.warns(ModelWarning, match="dt = 1 is longer than the motion.*t_end"):
         clamped().gravity((0, -1)).integrate(0.001, 1.0)

@@ -52,18 +52,18 @@ class NameUnknown(InputError):
 
     Attributes
     ----------
-    kind, name, known
-        The kind of name, the given name, and the known names.
+    kind, name, known, hint
+        The kind of name, the given name, the known names, and how the message ends.
     """
 
-    def __init__(self, kind: str, name: object, known: Iterable[Any]) -> None:
-        self.kind, self.name, self.known = kind, name, tuple(known)
+    def __init__(self, kind: str, name: object, known: Iterable[Any], hint: str = "") -> None:
+        self.kind, self.name, self.known, self.hint = kind, name, tuple(known), hint
         super().__init__(f"unknown {kind} {shown(name)}; known: "
                          f"{', '.join(map(repr, self.known)) or 'none'}"
-                         f"{_suggested(name, self.known)}")
+                         f"{hint or _suggested(name, self.known)}")
 
     def __reduce__(self):
-        return type(self), (self.kind, self.name, self.known)
+        return type(self), (self.kind, self.name, self.known, self.hint)
 
 
 class CallError(InputError, TypeError):

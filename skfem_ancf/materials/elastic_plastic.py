@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..core import (Array, ArrayLike, refuse, require_finite, require_not_negative,
                     require_positive)
 from .history import ACROSS, HistoryMaterial
+from .library import values_of
 from .return_mapping import (fibre, fibre_energy, hardened, plane_strain, plane_strain_energy,
                              plane_strain_fibre, plane_strain_fibre_energy, plane_stress,
                              plane_stress_energy)
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 #: Functions of a point and of a fibre, with their stored energies.
 FUNCTIONS = {"stress": (plane_stress, plane_stress_energy, fibre, fibre_energy),
@@ -107,11 +111,26 @@ class ElasticPlastic(HistoryMaterial):
         self.kinematic = require_not_negative("kinematic", kinematic)
         self.hardening = self._checked(hardening)
 
+    @classmethod
+    def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> Self:
+        """As :meth:`Material.named <skfem_ancf.materials.base.Material.named>`; the yield stress is
+        the strength.
+
+        Examples
+        --------
+        >>> ElasticPlastic.named("S235", ("N", "mm"), hardening=1000.0).yield_stress
+        235.0
+        """
+        strength = values_of(name, units)[0]["strength"]
+        return super().named(name, units, **{"yield_stress": strength, **changes})
+
     def _checked(self, hardening):
         if isinstance(hardening, Voce):
             for name, value in zip(hardening._fields, hardening):
                 require_not_negative(f"{name} of hardening", value)
             return hardening
+        refuse(isinstance(hardening, str), "hardening is a number, a table (n, 2) or "
+               "Voce(saturation, rate), got {!r}", hardening)
         if np.ndim(hardening) == 0:
             return require_not_negative("hardening", hardening, False)
         table = require_finite("hardening", hardening, (None, 2))

@@ -503,6 +503,11 @@ PLASTIC = "plastic_strain", "yield_ratio", "dissipated", "back_stress"
 DRAWN = tuple(name for name, f in FIELDS.items() if f.components == 1 or name == "displacement")
 
 
+#: Names that :class:`~skfem_ancf.Contact` has, and what is said of them.
+CONTACT = "pressure", "gap", "sticking", "penetration", "contact"
+OF_CONTACT = "; state.contact(on=...) has pressure, gap and sticking of the surface of a member"
+
+
 def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, ...] | None = None,
                ) -> Field:
     """The Field of a name, a function of :class:`Values` or a Field."""
@@ -514,7 +519,7 @@ def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, .
             if field in FIELDS:
                 raise InputError(f"a plot shows a field of one component, as "
                                  f"{', '.join(map(repr, known[:4]))}, got {field!r}")
-            raise NameUnknown("field", field, known)
+            raise NameUnknown("field", field, known, OF_CONTACT if field in CONTACT else "")
         return FIELDS[field]
     if callable(field) and not isinstance(field, type):
         name = getattr(field, "__name__", type(field).__name__).strip("<>")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, InputError, refuse, require_index
+from ...core import Array, InputError, NameUnknown, refuse, require_index
 from ..contact.contacts import SEEN
 from ..item import Item
 
@@ -91,6 +91,8 @@ def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
         known = [e for e in forces.elements if e.same(which) and (e.groups or hasattr(e, "look"))]
         refuse(not known, "{!r} is no obstacle and no contact of this scene", which)
     elif which is not None:
+        refuse(not forces.contacts.obstacles, "the scene has no obstacle: state.contact() is that "
+               "of its members, state.contact(on=...) that of one of them; got {!r}", which)
         known = [forces.contacts.obstacles[require_index("obstacle", which,
                                                          len(forces.contacts.obstacles))]]
     else:
@@ -107,6 +109,9 @@ def _number(members, which):
     for k, one in enumerate(members):
         if one is which or (which is not None and getattr(one, "name", None) == which):
             return k
+    if isinstance(which, str):
+        raise NameUnknown("member", which, [getattr(one, "name", None) or k
+                                            for k, one in enumerate(members)])
     return require_index("on", which, len(members))
 
 

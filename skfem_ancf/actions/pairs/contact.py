@@ -8,8 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from ...beam import Beam, Layout
-from ...core import (Array, InputError, refuse, require_flag, require_label, require_not_negative,
-                     require_positive, shown)
+from ...core import (Array, InputError, NameUnknown, refuse, require_flag, require_label,
+                     require_not_negative, require_positive, shown)
 from ..contact.contacts import SEEN
 from ..contact.points import add_resistance, potential, respond
 from ..contact.pairs import (COMPONENTS, both_faced, faced, meet, pair_accept, pair_force,
@@ -358,7 +358,10 @@ def _numbers(layout, which):
     """Numbers of members."""
     if isinstance(which, str) and which == "all":
         return list(range(len(layout.members)))
-    return [layout.number(one) for one in (which if isinstance(which, (list, tuple)) else [which])]
+    try:
+        return [layout.number(k) for k in (which if isinstance(which, (list, tuple)) else [which])]
+    except NameUnknown as error:
+        raise NameUnknown(error.kind, error.name, ("all", *error.known)) from None
 
 
 def _widened(facets, beams):
