@@ -158,7 +158,7 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
     # ``sampled`` are controllers with zero-order hold, whose samples are ends of steps.
     t_start = require_finite_scalar("t_start", t_start)
     t_end = require_finite_scalar("t_end", t_end)
-    refuse(t_end <= t_start, "t_end must lie after t_start, the time of the start: it is a time and "
+    refuse(t_end <= t_start, "t_end must lie after t_start, the time of the start: it is a time, "
            "no duration; got t_end = {!r}, t_start = {!r}", t_end, t_start)
     span = t_end - t_start
     breaks = [*np.atleast_1d(breakpoints)]
