@@ -18,8 +18,8 @@ from .quadrature import gauss, gauss_lobatto, hermite_basis, lagrange, product_r
 from .linear import angle_of, first_order, largest, step, stress_of, unwrapped
 from .archive import output_file
 from .band import Band, BandMatrix, Inertia
-from .callbacks import (call_custom, call_solver, custom_distance, deferred, handle_of, owner,
-                        raise_kept)
+from .callbacks import (call_custom, call_loaded, call_solver, custom_distance, deferred, handle_of,
+                        owner, raise_kept)
 from .packed import Packed, constant, hints
 from .progress import announced_bar, progress_bar
 from .source import (C1, C2, C3, F1, F2, F3, I1, I2, I3, MADE, apart, everywhere, indices,

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .code_cache import compiled_setting
 from .errors import NO_FACTORS
 from .source import PYTHON, apart, primitive
 
@@ -152,6 +153,15 @@ def raise_kept() -> None:
         error = _raised.pop(get_ident(), None)
         if error is not None:
             raise error
+
+
+#: How Python calls functions of loaded parts of compiled code.
+LOADED: dict[Any, Callable[..., Any]] = {}
+
+
+def call_loaded(function: Callable[..., Any], *args: Any) -> Any:
+    """Call a function marked by :func:`apart`: in compiled code if that is loaded, or in NumPy."""
+    return (function if compiled_setting() == "0" else LOADED.get(function, function))(*args)
 
 
 def _views(places, n):

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from ...beam import Beam, Layout
-from ...core import (Array, InputError, NameUnknown, refuse, require_flag, require_label,
-                     require_not_negative, require_positive, shown)
+from ...core import (Array, InputError, NameUnknown, call_loaded, refuse, require_flag,
+                     require_label, require_not_negative, require_positive, shown)
 from ..contact.contacts import SEEN
 from ..contact.points import add_resistance, potential, respond
 from ..contact.pairs import (COMPONENTS, both_faced, faced, meet, pair_accept, pair_force,
@@ -208,7 +208,7 @@ class BodyContact(ForceElement):
         (z0, z1), n, tables = _complex(x, y), 2 * len(self.dofs), self._tables(past[0])
         P = len(tables.of)
         facets, zeta, K = np.empty(P, np.int64), np.empty(P), np.empty((COMPONENTS**2, P))
-        k = pair_stiffness(tables, z0, z1, z0 is z1, facets, zeta, K)
+        k = call_loaded(pair_stiffness, tables, z0, z1, z0 is z1, facets, zeta, K)
         # by the components of degrees of freedom; those of r, t, c and T are products of complex
         # weights, conjugate for derivatives
         p = np.flatnonzero(facets >= 0)
@@ -350,7 +350,7 @@ def _plane(z):
 
 def _complex(x, y):
     """Displacements as complex numbers, one array for equal ones."""
-    z0, z1 = (np.ascontiguousarray(u, dtype=float).view(complex)[:, 0] for u in (x, y))
+    z0, z1 = (np.array(u, dtype=float, order="C").view(complex)[:, 0] for u in (x, y))
     return z0, z0 if x is y or np.array_equal(x, y) else z1
 
 
