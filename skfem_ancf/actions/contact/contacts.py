@@ -239,11 +239,11 @@ class Contacts:
             pair.slips[:] *= part
         self.stiffening[:] = stiffening
 
-    def stiffened(self, k: int, u: Array, t: float) -> tuple[Array, Array, Array]:
+    def stiffened(self, k: int, u: Array, t: float, gap: Array) -> tuple[Array, Array, Array]:
         """Derivatives by the logarithm of the stiffness of group k, and forces, of the pressure."""
         # Those of the force on the degrees of freedom (N,); then by point the derivative, and the
-        # force, times the penetration, (n,).
-        (_, group), _, gap = self.look(u, t)[k]
+        # force, times the penetration, (n,). ``gap`` (n,) is that at u and t.
+        _, group = self.groups[k]
         memory, pair, factor = self.tables.memory, self.tables.pairs[k], 1.0 + self.stiffening[k]
         width, a = transition(pair), np.maximum(-gap, 0.0)
         push = factor * group.law.stiffness * group.areas * a
@@ -268,7 +268,7 @@ class Contacts:
         for k, ((_, group), _, gap) in enumerate(self.look(u, t)):
             if group.largest_factor <= 1.0 or not np.any(gap < 0.0):
                 continue
-            force, change, work = self.stiffened(k, u, t)
+            force, change, work = self.stiffened(k, u, t, gap)
             slender = np.ptp(group.starts[:2], axis=1).max() > STOUT * group.height
             if slender and 2.0 * work[-2 * group.points:].sum() < work.sum():
                 continue
