@@ -307,7 +307,7 @@ class NullSpace:
             given[at] = True
             self._groups.append((block, at, R, M))
         self._T = self._basis(given)
-        self._reduced = (self._T.T @ self._K @ self._T).tocsc()
+        self._reduced = (self._T.T @ self._K @ self._T).tocsc() if m else self._K
         self._lu, self._plain = self._factors(K.symmetric)
 
     def _basis(self, given):
