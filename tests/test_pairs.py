@@ -191,6 +191,23 @@ def test_an_impact_keeps_energy_and_momenta(element, friction):
     assert (history.dissipated[-1] > 1e-4 * energy[0]) == (friction > 0.0)
 
 
+@pytest.mark.parametrize("dt", [1e-3, 2e-4])
+def test_what_bounces_on_a_member_slides_by_coulombs_law(dt):
+    """Friction acts in the steps in which points begin to touch or part, as on an obstacle."""
+    rubber, mu, g, end = StVenantKirchhoff(1e9, 0.0, density=1000.0), 0.2, 9.81, 0.04
+    block = Beam(MeshBeam.init_line(np.linspace(0.4, 0.6, 2), height=0.02, origin=(0.0, 0.01001)),
+                 ElementBeamANCF(2), rubber, width=0.02)
+    floor = Beam(MeshBeam.init_line(np.linspace(0.0, 2.0, 3), height=0.1, origin=(0.0, -0.05)),
+                 ElementBeamANCF(2), rubber.replace(E=1e10), width=0.02)
+    scene = Scene(block, floor).contact("all", friction=mu, stiffness=1e9).clamp("left", 1)
+    scene.clamp("right", 1).gravity((0.0, -g)).initial_velocity((1.0, 0.0), 0)
+    history = scene.integrate(end, dt)
+    lost = 1.0 - history.state(-1).displacement("left", 0)[0] / end
+    total = history.total_energy + history.dissipated
+    assert lost == pytest.approx(0.5 * mu * g * end, rel=0.1)
+    assert np.ptp(total) < 1e-9 * total[0]
+
+
 def test_rods_that_collide_lengthwise_part_after_two_passages():
     """St. Venant (1867): equal rods exchange their velocities in the time 2 L / c."""
     c, L, v, gap = 100.0, 1.0, -1.0, 2e-4

@@ -438,6 +438,15 @@ def vectors(t, found, p, e, zeta):
 
 
 @source
+def way_along(a, b, row):
+    """Slip of what begins to touch in a step, from where it was at the start."""
+    way = 0.0
+    for v in range(COMPONENTS // 2):
+        way = way + dot(row[v], b[v] - a[v])
+    return way
+
+
+@source
 def touch_of(t, f0, f1, met):
     """The :class:`~skfem_ancf.actions.contact.points.Touch` of pairs."""
     n = met.at.size
@@ -456,7 +465,9 @@ def touch_of(t, f0, f1, met):
         k[i] = stiffness * met.share[i]
         if t.friction > 0.0:
             path, held, _ = slip_along(t, f1, p, e)
-            trial[i], spring[i] = stiffness * path, stiffness * held
+            new, way = held == 0.0, way_along(a, b, by_slip)
+            trial[i] = stiffness * where(new, way, path)
+            spring[i] = stiffness * where(new, 1.0 * (way != 0.0), held)
     return Touch(met.at, k, met.before, met.after, np.zeros(n), moved, gap, slip, trial, spring)
 
 
@@ -518,7 +529,10 @@ def pair_accept(t, z0, z1, after):
     curves, anchors = np.zeros(n), np.zeros(n)
     for i in indices(at.size):
         p, e = at[i], f1.e[at[i]]
-        a, (slip, _, rate) = t.begins[p] - f1.gap[p], slip_along(t, f1, p, e)
+        a, (slip, held, rate) = t.begins[p] - f1.gap[p], slip_along(t, f1, p, e)
+        x, y = vectors(t, f0, p, e, f1.zeta[p]), vectors(t, f1, p, e, f1.zeta[p])
+        row = slip_row(x, y, t.sides[t.of[p]] * t.offsets[t.of[p]])
+        slip = where(held == 0.0, way_along(x, y, row), slip)
         left, _ = return_mapping(slip, t.friction * mean_pressure(a, a, t.width))
         curves[p], anchors[p] = t.curves[e] + 1.0, place(t, e, f1.zeta[p]) - left / rate
     copy(curves, after[1:1 + n])
