@@ -41,6 +41,8 @@ SURE = 6
 FOLDED = 2.5
 #: Largest number of steps along the path to a limit point.
 PATH = 100
+#: Iterations of a load step of the last strategy.
+PATIENT = 100
 #: Methods and their names; "auto" tries several strategies, the others are a single iteration.
 METHODS = {"mixed": "the mixed iteration", "newton": "Newton's method", "auto": ""}
 
@@ -177,7 +179,8 @@ class Search:
             except LoadStepFailed as failure:
                 self._note(name, str(failure))
                 self._unstable = self._unstable or isinstance(failure, Unstable)
-                if name != "descent" or self._failure is None:  # that of load steps says more
+                # that of load steps along the path says more
+                if name not in ("descent", METHODS["newton"]) or self._failure is None:
                     self._failure = failure
                 if self._exhausted or isinstance(failure, UnboundedMotion):
                     break
@@ -217,6 +220,10 @@ class Search:
             yield "descent", self.descent
             if few and system.clock is None:  # increments of a run are cut instead
                 yield "load steps as small as may be", partial(self.load_steps, "mixed")
+        if not self.touches and system.clock is None:
+            # without an independent stress: it jumps where the path ends of loads that have no
+            # potential, and where a very slender body turns far
+            yield METHODS["newton"], partial(self.load_steps, "newton", True, PATIENT)
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
@@ -405,14 +412,15 @@ class Search:
         return StaticResult(route.u, np.zeros(self.system.constraints.m), 0.0, None, [], False,
                             "no load step has converged", memory=self._memory)
 
-    def load_steps(self, method: str, few: bool = False) -> StaticResult:
+    def load_steps(self, method: str, few: bool = False, most: int = 0) -> StaticResult:
         """The equilibrium at full load by load steps."""
-        # With ``few``, they stop after :data:`FEW` iterations.
+        # With ``few``, they stop after :data:`FEW` iterations. Each may take ``most``.
         rules, route, stable, spent = self.rules, self.route, self.stable, 0
         result, size, cuts = self._beginning(route), rules.first_step, 0
         if self._auto and self._at_once:  # a strategy has tried the larger step
             size, result.rejected, cuts = 0.25, 1, int(self._unstable)
         options = self._options(route, method, watched=few)
+        options = options._replace(most=max(most, options.most))
         patience = 3 if self.touches else 1
         with progress_bar(self.progress, total=1.0, desc="load") as bar:
             while result.load < 1.0:
