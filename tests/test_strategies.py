@@ -109,6 +109,23 @@ def test_a_pendulum_hangs(element, angle):
     assert np.allclose(state.reactions("left").force, [0, 7800 * 9.81 * 1e-4], rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("radius", [0.5, 0.823])
+@pytest.mark.parametrize("angle", [0.0, 2.0, 2.4])
+def test_a_slender_arc_that_is_pulled_straight_is_solved_at_any_degree(angle, radius):
+    """Its tip lies in the direction of the force; a descent of degree 13 takes too long."""
+    force, across, reach = (3.22 * np.array([np.cos(angle), np.sin(angle)]),
+                            np.array([-np.sin(angle), np.cos(angle)]), [])
+    for element, n in ((ElementBeamCable(13), 3), (ElementBeamCable(5), 8)):
+        mesh = MeshBeam.init_curve(lambda s: radius * np.array(
+            [np.sin(s / radius), 1.0 - np.cos(s / radius)]), np.linspace(0.0, 1.35, n + 1), 1.35e-3)
+        scene = Scene(Beam(mesh, element, steel(), 0.1)).pin("left")
+        state = scene.point_force(force, at="right").solve_static()
+        tip = state.position("right")
+        assert state.stability == "stable" and abs(tip @ across) < 1e-9
+        reach.append(tip @ force / 3.22)
+    assert reach[0] == pytest.approx(reach[1], rel=1e-6) and reach[0] > 1.04
+
+
 def chain(bars, angle, E=2e11, h=0.02):
     d = np.array([np.cos(angle), np.sin(angle)])
     beams = [Beam(line(3, 1.0, h, origin=tuple(k * d), angle=angle), ElementBeamCable(5), steel(E),

@@ -41,8 +41,6 @@ SURE = 6
 FOLDED = 2.5
 #: Largest number of steps along the path to a limit point.
 PATH = 100
-#: Iterations of a load step of the last strategy.
-PATIENT = 100
 #: Methods and their names; "auto" tries several strategies, the others are a single iteration.
 METHODS = {"mixed": "the mixed iteration", "newton": "Newton's method", "auto": ""}
 
@@ -223,7 +221,7 @@ class Search:
         if not self.touches and system.clock is None:
             # without an independent stress: it jumps where the path ends of loads that have no
             # potential, and where a very slender body turns far
-            yield METHODS["newton"], partial(self.load_steps, "newton", True, PATIENT)
+            yield METHODS["newton"], partial(self.load_steps, "newton", True)
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
@@ -412,15 +410,14 @@ class Search:
         return StaticResult(route.u, np.zeros(self.system.constraints.m), 0.0, None, [], False,
                             "no load step has converged", memory=self._memory)
 
-    def load_steps(self, method: str, few: bool = False, most: int = 0) -> StaticResult:
+    def load_steps(self, method: str, few: bool = False) -> StaticResult:
         """The equilibrium at full load by load steps."""
-        # With ``few``, they stop after :data:`FEW` iterations. Each may take ``most``.
+        # With ``few``, they stop after :data:`FEW` iterations.
         rules, route, stable, spent = self.rules, self.route, self.stable, 0
         result, size, cuts = self._beginning(route), rules.first_step, 0
         if self._auto and self._at_once:  # a strategy has tried the larger step
             size, result.rejected, cuts = 0.25, 1, int(self._unstable)
         options = self._options(route, method, watched=few)
-        options = options._replace(most=max(most, options.most))
         patience = 3 if self.touches else 1
         with progress_bar(self.progress, total=1.0, desc="load") as bar:
             while result.load < 1.0:
