@@ -112,7 +112,7 @@ def test_a_pendulum_hangs(element, angle):
 @pytest.mark.parametrize("radius", [0.5, 0.823])
 @pytest.mark.parametrize("angle", [0.0, 2.0, 2.4])
 def test_a_slender_arc_that_is_pulled_straight_is_solved_at_any_degree(angle, radius):
-    """Its tip lies in the direction of the force; a descent of degree 13 takes too long."""
+    """Its tip lies in the direction of the force. At degree 13 a mode has nearly no stiffness."""
     force, across, reach = (3.22 * np.array([np.cos(angle), np.sin(angle)]),
                             np.array([-np.sin(angle), np.cos(angle)]), [])
     for element, n in ((ElementBeamCable(13), 3), (ElementBeamCable(5), 8)):

@@ -13,8 +13,8 @@ from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, 
 from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
 from . import strategies
-from .iteration import (CONVERGED, INDEFINITE, ITERATIONS, NOT_CONVERGED, NOT_FINITE, SINGULAR,
-                        Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
+from .iteration import (CONVERGED, INDEFINITE, ITERATIONS, NOT_CONVERGED, SINGULAR, Diverging,
+                        Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed, Slow,
                         StaticResult, Unstable, equilibrium)
 
 logger = logging.getLogger(__name__)
@@ -211,7 +211,7 @@ class Increment:
         self.record.force_residuals += record[0, :k].tolist()
         self.record.energy_residuals += record[1, :n].tolist()
         if status != CONVERGED:
-            self._failed(status, n, rules)
+            self._failed(status, n, rules, (x[U], m[0]))
         if system.inverted(x[U]):
             raise LoadStepFailed("an element is turned inside out")
         if lost := system.constraints.lost(x[U]):
@@ -256,7 +256,7 @@ class Increment:
                         solver.handle, definite)
         return target, np.array([factors, first]), gap, moved
 
-    def _failed(self, status, n, rules):
+    def _failed(self, status, n, rules, reached):
         """Raise LoadStepFailed after n corrections."""
         if status == NOT_CONVERGED and n < rules.iterations:
             if rules.give_up == BY_SECOND_OR_LATE and n == 2:
@@ -264,9 +264,10 @@ class Increment:
             raise Diverging("the first corrections do not decrease"
                             if rules.give_up == BY_THIRD else
                             f"the corrections do not decrease in {n} iterations")
-        raise LoadStepFailed({
-            SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
-            NOT_CONVERGED: f"no convergence in {rules.iterations} iterations"}[status])
+        if status == NOT_CONVERGED:
+            raise Slow(f"no convergence in {rules.iterations} iterations", reached)
+        raise LoadStepFailed("the tangent is singular" if status == SINGULAR else
+                             "the strain is not finite")
 
     def rescue(self, failure: LoadStepFailed) -> Equilibrium | None:
         """A stable equilibrium if the path has lost its stability, else None."""

@@ -125,6 +125,14 @@ class Diverging(LoadStepFailed):
     """The first corrections of a load step did not decrease."""
 
 
+class Slow(LoadStepFailed):
+    """The iterations have not sufficed; ``reached`` are the last displacement and multipliers."""
+
+    def __init__(self, message: str, reached: tuple[Array, Array]) -> None:
+        super().__init__(message)
+        self.reached = reached
+
+
 class UnboundedMotion(LoadStepFailed):
     """A descent goes on in a motion that nothing restrains."""
 

@@ -219,8 +219,8 @@ class Search:
             if few and system.clock is None:  # increments of a run are cut instead
                 yield "load steps as small as may be", partial(self.load_steps, "mixed")
         if not self.touches and system.clock is None:
-            # without an independent stress: it jumps where the path ends of loads that have no
-            # potential, and where a very slender body turns far
+            # without an independent stress it may jump where the path of loads without a potential
+            # ends
             yield METHODS["newton"], partial(self.load_steps, "newton", True)
 
     def _note(self, name, failure=""):

@@ -33,7 +33,7 @@ from ..equations.stability import (inverse_on_positions, largest_displacement, p
                                    potential, response, verdict)
 from ..equations.system import System
 from .continuation import Point, Tracer
-from .iteration import Equilibrium, LoadStepFailed, StaticResult
+from .iteration import Equilibrium, LoadStepFailed, Slow, StaticResult
 
 logger = logging.getLogger(__name__)
 
@@ -50,8 +50,8 @@ KICKS = 6
 SOFTER = 8.0
 #: Number of step cuts at unstable points before the path counts as unstable.
 CUTS = 3
-#: Iterations of a descent.
-DESCENT = 200
+#: Iterations of a descent, and of Newton's method at its end.
+DESCENT, LAST = 200, 30
 #: Largest radius, and displacement that counts as diverged, relative to the scene's size.
 WIDEST, LOST = 0.5, 20.0
 #: Number of iterations between stored displacements; smallest cosine between successive changes
@@ -107,6 +107,11 @@ class Descent:
         self._shift, self._before = 0.0, np.zeros(system.N)
         self._small = self._calls = 0
         self._passed: list[Array] = []
+
+    @property
+    def shifted(self) -> bool:
+        """True if the last tangent was made definite: it was not that of Newton's method."""
+        return self._shift > 0.0
 
     def onward(self) -> tuple[Array, Array] | None:
         """The displacement and its last change (N,) of a motion without end; else None."""
@@ -254,7 +259,12 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
     system, start, load = increment.system, increment.start, increment.load
     u, multipliers = start.u, start.multipliers
     for _ in range(KICKS):
-        found = increment.iterate((u, multipliers), options, descent)
+        try:
+            found = increment.iterate((u, multipliers), options, descent)
+        except Slow as failure:  # at its end Newton's method is better, where a mode is very soft
+            if descent.shifted:
+                raise
+            found = increment.iterate(failure.reached, options._replace(method="newton", most=LAST))
         u, multipliers = found.u, found.multipliers
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
             return found
