@@ -344,7 +344,7 @@ class Search:
                 and not stability.has_potential(system, route.u, 1.0)):
             raise LoadStepFailed("the loads have no potential")
         down, far = strategies.Descent(system), options._replace(
-            most=min(most, 7 * self.rules.max_iterations))
+            most=min(most, strategies.SHORTER * self.rules.max_iterations))
         # descents start where obstacles have moved to
         times = (route.load_and_time(level)[1] for level in (0.0, 1.0))
         if passed := system.forces.passed(*((result.u, t) for t in times)):

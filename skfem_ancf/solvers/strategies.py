@@ -50,8 +50,8 @@ KICKS = 6
 SOFTER = 8.0
 #: Number of step cuts at unstable points before the path counts as unstable.
 CUTS = 3
-#: Iterations of a descent, and of Newton's method at its end.
-DESCENT, LAST = 200, 30
+#: Iterations of a descent, and over those of Newton's method at its end.
+DESCENT, SHORTER = 200, 7
 #: Largest radius, and displacement that counts as diverged, relative to the scene's size.
 WIDEST, LOST = 0.5, 20.0
 #: Number of iterations between stored displacements; smallest cosine between successive changes
@@ -264,7 +264,8 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
         except Slow as failure:  # at its end Newton's method is better, where a mode is very soft
             if descent.shifted:
                 raise
-            found = increment.iterate(failure.reached, options._replace(method="newton", most=LAST))
+            found = increment.iterate(failure.reached, options._replace(
+                method="newton", most=options.most // SHORTER))
         u, multipliers = found.u, found.multipliers
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
             return found
