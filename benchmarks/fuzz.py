@@ -330,12 +330,12 @@ class Body:
             w = np.array([1.0 - middle, 2.0 * middle, 1.0 - middle])
         first, second = [], []
         for L in beam.mesh.lengths:
-            ends = np.array([[math.perm(j, d) * s**(j - d) if j >= d else 0.0
-                              for j in range(2 * m)] for s in (0.0, L) for d in range(m)])
+            c = 2.0 / L  # from 0 to L the monomials are too much alike
+            ends = np.array([[c**d * math.perm(j, d) * s**(j - d) if j >= d else 0.0
+                              for j in range(2 * m)] for s in (-1.0, 1.0) for d in range(m)])
             inverse = np.linalg.inv(ends)
-            s = 0.5 * L * (x + 1)
             for out, d in ((first, 1), (second, 2)):
-                powers = np.array([math.perm(j, d) * s**max(j - d, 0) if j >= d else 0.0 * s
+                powers = np.array([c**d * math.perm(j, d) * x**max(j - d, 0) if j >= d else 0.0 * x
                                    for j in range(2 * m)]).T
                 out.append(powers @ inverse)
         self.G = np.array(first), np.array(second)
