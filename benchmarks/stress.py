@@ -672,19 +672,20 @@ def pairs(quick, out):
                 np.abs(turn)), 1e-10)
 
 
-def squeezed(n, friction, fine=False, rest=()):
+def squeezed(n, friction, fine=False, rest=(), unit=1.0):
     """Wavy wires that nothing holds in a box, whose lid comes down by half of its height until t =
     1, and stays there at instants ``rest``: the run, the largest penetration over the height h, and
-    the forces of left and right wall, floor, lid."""
+    the forces of left and right wall, floor, lid. ``unit`` is that of lengths."""
     element, parts, increments = (ElementBeamANCFCubic(1), 10, 200) if fine else (
         ElementBeamCable(3), 4, 20)
-    h, rng = 0.02, np.random.default_rng(3)
-    beams = [Beam(MeshBeam.init_curve(
-        lambda s, c=c, k=k: np.array([s, (3.6 * k + 1.2 * np.sin(2 * np.pi * s + c)) * h]),
-        np.linspace(0, 1, parts + 1), height=h), element, StVenantKirchhoff(1e6, 0.0, 1.0), 1.0)
+    h, rng = 0.02 * unit, np.random.default_rng(3)
+    beams = [Beam(MeshBeam.init_curve(lambda s, c=c, k=k: np.array(
+        [s, (3.6 * k + 1.2 * np.sin(2 * np.pi * s / unit + c)) * h]),
+        np.linspace(0, 1, parts + 1) * unit, height=h), element,
+        StVenantKirchhoff(1e6 / unit, 0.0, 1.0), unit)
         for k, c in enumerate(rng.uniform(0, 2 * np.pi, n))]
     scene, low, top = Scene(*beams).contact("all", friction=friction), -1.8 * h, (3.6 * n - 1.8) * h
-    for place, normal in (((-0.02, 0), (1, 0)), ((1.02, 0), (-1, 0)), ((0, low), (0, 1))):
+    for place, normal in (((-h, 0), (1, 0)), ((unit + h, 0), (-1, 0)), ((0, low), (0, 1))):
         scene.obstacle(Line(place, normal))
     scene.obstacle(Line((0, top), (0, -1)), position=lambda t: (
         0, -0.5 * min(t, 1.0) * (top - low)))

@@ -318,6 +318,14 @@ def test_wires_that_nothing_holds_are_squeezed_in_a_box():
     assert walls[3, 1] < -1.0 and deepest < 0.01 and require_balanced(run, walls) < 0.06
 
 
+@pytest.mark.parametrize("unit", [2.0**20, 2.0**-20])
+def test_what_nothing_holds_moves_alike_in_all_units_of_length(unit):
+    """Other lengths in metres than micrometres made a drag of three times as much."""
+    runs = [stress.squeezed(2, 0.0, unit=one)[0] for one in (1.0, unit)]
+    size = np.tile([unit, unit, 1.0, 1.0], runs[0].u.shape[1] // 4)
+    assert_allclose(runs[1].u / size, runs[0].u, rtol=0, atol=1e-7)
+
+
 def test_wires_with_friction_are_squeezed_in_a_box(needs_compiled):
     run, deepest, walls = stress.squeezed(4, 0.2)
     assert run.t[-1] == 1.0 and walls[3, 1] < -1.0 and deepest < 0.01

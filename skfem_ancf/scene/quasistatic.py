@@ -45,8 +45,8 @@ SLOW, PATIENCE = 1e-2, 30
 #: then relative to that at the last rate, or to the size.
 FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
 #: Drag of loose beams relative to their softest bending, that of a free beam over E I / L^4; its
-#: least value per length and width, relative to E; factors for an increment that fails. Least
-#: number of iterations allowed: contacts open and close in turn.
+#: least value relative to E / L; factors for an increment that fails. Least number of iterations
+#: allowed: contacts open and close in turn.
 DRAG, FREE, LEAST_DRAG, MORE_DRAG, LOOSE = 0.02, 500.0, 1e-9, (10.0, 100.0, 1e3), 60
 
 
@@ -408,7 +408,7 @@ def drag_of(system: System) -> Array | None:
         mesh, E = beam.mesh, stiffest(beam.across, np.arange(beam.mesh.nelements))[0]
         length = mesh.lengths.sum() / len(np.unique(mesh.chains))
         bending = FREE * mesh.height**3 / 12.0 / length**4
-        drag = DRAG * E * max(bending, LEAST_DRAG) * beam.across.outline(np.full((2, 1), 0.5))[0]
+        drag = DRAG * E * max(bending, LEAST_DRAG / length) * beam.across.outline(np.full((2, 1), 0.5))[0]
         parts = 0.5 * drag * np.bincount(mesh.t.ravel(), np.tile(mesh.lengths, 2))
         out[s].reshape(-1, beam.nd)[:, :2] = parts[:, None]
     bodies = np.setdiff1d(position_weights(system).nonzero()[0], out.nonzero()[0])
