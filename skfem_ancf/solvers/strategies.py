@@ -262,8 +262,8 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
         try:
             found = increment.iterate((u, multipliers), options, descent)
         except Slow as failure:  # at its end Newton's method is better, where a mode is very soft
-            if descent.shifted:
-                raise
+            if descent.shifted or system.forces.contacts.obstacles or system.forces.changing:
+                raise  # far from the end, or where it may leave what is touched
             found = increment.iterate(failure.reached, options._replace(
                 method="newton", most=options.most // SHORTER))
         u, multipliers = found.u, found.multipliers
