@@ -407,8 +407,8 @@ def drag_of(system: System) -> Array | None:
     for beam, s in zip(system.beams, system.slices):
         mesh, E = beam.mesh, stiffest(beam.across, np.arange(beam.mesh.nelements))[0]
         length = mesh.lengths.sum() / len(np.unique(mesh.chains))
-        bending = FREE * mesh.height**3 / 12.0 / length**4
-        drag = DRAG * E * max(bending, LEAST_DRAG / length) * beam.across.outline(np.full((2, 1), 0.5))[0]
+        bending = max(FREE * mesh.height**3 / 12.0 / length**4, LEAST_DRAG / length)
+        drag = DRAG * E * bending * beam.across.outline(np.full((2, 1), 0.5))[0]
         parts = 0.5 * drag * np.bincount(mesh.t.ravel(), np.tile(mesh.lengths, 2))
         out[s].reshape(-1, beam.nd)[:, :2] = parts[:, None]
     bodies = np.setdiff1d(position_weights(system).nonzero()[0], out.nonzero()[0])
