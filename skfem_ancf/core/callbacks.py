@@ -156,12 +156,14 @@ def raise_kept() -> None:
 
 
 #: How Python calls functions of loaded parts of compiled code.
-LOADED: dict[Any, Callable[..., Any]] = {}
+FROM_PYTHON: dict[Any, Callable[..., Any]] = {}
 
 
-def call_loaded(function: Callable[..., Any], *args: Any) -> Any:
-    """Call a function marked by :func:`apart`: in compiled code if that is loaded, or in NumPy."""
-    return (function if compiled_setting() == "0" else LOADED.get(function, function))(*args)
+def call_loaded(function: Callable[..., Any], allowed: bool, *args: Any) -> Any:
+    """Call a function marked by :func:`apart`: in compiled code if that is allowed and loaded, or
+    in NumPy."""
+    allowed = allowed and compiled_setting() != "0"
+    return (FROM_PYTHON.get(function, function) if allowed else function)(*args)
 
 
 def _views(places, n):

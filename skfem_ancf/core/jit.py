@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pickle
 from ctypes import CFUNCTYPE, c_double, c_int64, c_void_p, cast
-from functools import cache, partial
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -20,7 +20,7 @@ from numba import cfunc, njit, types, typeof
 from numba.extending import (intrinsic, lower_builtin, lower_getattr_generic, models, overload,
                              register_model, type_callable)
 
-from .callbacks import LOADED, deferred, kept as keeping, raise_kept
+from .callbacks import FROM_PYTHON, deferred, kept as keeping, raise_kept
 from .code_cache import cannot_keep, can_keep, key, nothing_collected, verified
 from .source import APART, MADE, MARKED, PYTHON, apart, room, shaped
 from .packed import Packed, hints
@@ -151,21 +151,23 @@ def load_part(part: str) -> None:
     for function, one in APART.items():
         if one.part == part:
             load(function)
-            LOADED[function] = partial(_call_entry, function)
+            FROM_PYTHON[function] = _from_python(function)
 
 
-_ENTRIES: dict[Any, Any] = {}
+def _from_python(function):
+    """A function that calls the :func:`entry` of another, with exceptions of callbacks."""
+    made: list[Any] = []
 
+    def call(tables, *args):
+        if not made:
+            made.append(entry(function, (tables, *args)))
+        words = Packed(tables)
+        with deferred():
+            found = made[0](words.address, *args)
+        raise_kept()
+        return found
 
-def _call_entry(function, tables, *args):
-    """Call the :func:`entry` of a function, with exceptions of callbacks."""
-    if function not in _ENTRIES:
-        _ENTRIES[function] = entry(function, (tables, *args))
-    words = Packed(tables)
-    with deferred():
-        found = _ENTRIES[function](words.address, *args)
-    raise_kept()
-    return found
+    return call
 
 
 class Record(types.NamedTuple):

@@ -106,10 +106,10 @@ def _gained(run, history):
     """A warning if yielding within steps of collocation has brought energy in, or None."""
     # Points of a step that does not resolve stress waves yield to and fro.
     system = run.system
-    if not (run.scheme.collocates and system.histories.path_dependent) or system.varies or (
-            system.backend.tables.motion_varies or system.forces.elements
-            or len(history) < 2 or any(load.potential(0.0 * history.u[0][system.of(load)]) is None
-                   for load in system.loads)):
+    if not (run.scheme.collocates and system.histories.path_dependent and len(history) > 1):
+        return None
+    if system.varies or system.backend.tables.motion_varies or system.forces.elements or any(
+            load.potential(0.0 * history.u[0][system.of(load)]) is None for load in system.loads):
         return None  # the work from outside is not known
     columns = {name: rows[[0, -1]] for name, rows in history._columns.items()}
     ends = History(system, run.scheme, columns, (None, None), history.sensors)

@@ -181,7 +181,7 @@ class Prony(HistoryMaterial):
         return S, after
 
     def moduli(self, strain: Array, history: Array, dt: float) -> Array:  # type: ignore[override]
-        return relax(self.constants, (), dt, (), ()) * self._law.moduli(strain)
+        return relax(self.constants, (), dt, (), ()) * self._law.moduli(strain)  # of no stresses
 
     def energy(self, strain: Array, history: Array) -> Array:  # type: ignore[override]
         """That of the springs: of the law, and of those that relax with its moduli at rest."""

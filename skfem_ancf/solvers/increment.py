@@ -14,7 +14,7 @@ from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
 from . import strategies
 from .iteration import (CONVERGED, INDEFINITE, ITERATIONS, NOT_CONVERGED, SINGULAR, Diverging,
-                        Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed, Slow,
+                        Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed, TooManyIterations,
                         StaticResult, Unstable, equilibrium)
 
 logger = logging.getLogger(__name__)
@@ -265,7 +265,7 @@ class Increment:
                             if rules.give_up == BY_THIRD else
                             f"the corrections do not decrease in {n} iterations")
         if status == NOT_CONVERGED:
-            raise Slow(f"no convergence in {rules.iterations} iterations", reached)
+            raise TooManyIterations(f"no convergence in {rules.iterations} iterations", reached)
         raise LoadStepFailed("the tangent is singular" if status == SINGULAR else
                              "the strain is not finite")
 

@@ -125,7 +125,7 @@ class Diverging(LoadStepFailed):
     """The first corrections of a load step did not decrease."""
 
 
-class Slow(LoadStepFailed):
+class TooManyIterations(LoadStepFailed):
     """The iterations have not sufficed; ``reached`` are the last displacement and multipliers."""
 
     def __init__(self, message: str, reached: tuple[Array, Array]) -> None:

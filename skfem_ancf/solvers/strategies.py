@@ -33,7 +33,7 @@ from ..equations.stability import (inverse_on_positions, largest_displacement, p
                                    potential, response, verdict)
 from ..equations.system import System
 from .continuation import Point, Tracer
-from .iteration import Equilibrium, LoadStepFailed, Slow, StaticResult
+from .iteration import Equilibrium, LoadStepFailed, TooManyIterations, StaticResult
 
 logger = logging.getLogger(__name__)
 
@@ -261,7 +261,8 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
     for _ in range(KICKS):
         try:
             found = increment.iterate((u, multipliers), options, descent)
-        except Slow as failure:  # at its end Newton's method is better, where a mode is very soft
+        except TooManyIterations as failure:
+            # at its end Newton's method is better, where a mode is very soft
             if descent.shifted or system.forces.contacts.obstacles or system.forces.changing:
                 raise  # far from the end, or where it may leave what is touched
             found = increment.iterate(failure.reached, options._replace(

@@ -439,7 +439,7 @@ def vectors(t, found, p, e, zeta):
 
 @source
 def way_along(a, b, row):
-    """Slip of what begins to touch in a step, from where it was at the start."""
+    """Change of the place along the facet between two states."""
     way = 0.0
     for v in range(COMPONENTS // 2):
         way = way + dot(row[v], b[v] - a[v])
@@ -465,6 +465,7 @@ def touch_of(t, f0, f1, met):
         k[i] = stiffness * met.share[i]
         if t.friction > 0.0:
             path, held, _ = slip_along(t, f1, p, e)
+            # what has no anchor slips from where it was at the start of the step
             new, way = held == 0.0, way_along(a, b, by_slip)
             trial[i] = stiffness * where(new, way, path)
             spring[i] = stiffness * where(new, 1.0 * (way != 0.0), held)

@@ -117,6 +117,7 @@ class BodyContact(ForceElement):
     def bind(self, layout: Layout) -> list[Vector]:
         used, allowed = self._members(layout)
         beams = [k for k in used if isinstance(layout.members[k], Beam)]
+        self._compiled = all(layout.members[k].compiled for k in beams)
         origin = complex(*np.mean([layout.members[k].origin for k in used], axis=0))
         f = _widened(facets_of(layout, used, origin), beams)
         self.dofs = np.unique(f.dofs)
@@ -208,7 +209,7 @@ class BodyContact(ForceElement):
         (z0, z1), n, tables = _complex(x, y), 2 * len(self.dofs), self._tables(past[0])
         P = len(tables.of)
         facets, zeta, K = np.empty(P, np.int64), np.empty(P), np.empty((COMPONENTS**2, P))
-        k = call_loaded(pair_stiffness, tables, z0, z1, z0 is z1, facets, zeta, K)
+        k = call_loaded(pair_stiffness, self._compiled, tables, z0, z1, z0 is z1, facets, zeta, K)
         # by the components of degrees of freedom; those of r, t, c and T are products of complex
         # weights, conjugate for derivatives
         p = np.flatnonzero(facets >= 0)

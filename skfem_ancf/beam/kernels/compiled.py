@@ -129,7 +129,8 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
     K, Z, coupled = _constant(each(t.C, OF_C), D)
     P, Q = map(np.ascontiguousarray, _products(G[0], pattern.products, own))
     along, mixing = map(_sparse, (
-        t.along, t.along[:0] if t.law.kind == LINEAR else to_moduli(t)))
+        t.along, t.along[:0] if t.law.kind == LINEAR else to_moduli(
+            t.pattern, t.weights.shape[1], t.along.tobytes())))
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
         compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, cached_property
-from .tables import (CABLE, LINEAR, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables, conserve,
-                     law_evaluate)
+from .tables import (CABLE, LINEAR, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, Pattern, StrainTables,
+                     conserve, law_evaluate)
 
 #: Mode of ``take`` for valid numbers, which is the fastest.
 CLIP: Any = "clip"
@@ -85,14 +85,10 @@ def _to_rows(terms: bytes, rows: int) -> Any:
     return sparse.csr_matrix((np.ones(6 * n), (to, of)), shape=(3 * rows**2, 4 * n))
 
 
-def to_moduli(t: StrainTables) -> Any:
+@lru_cache(64)
+def to_moduli(pattern: Pattern, points: int, along: bytes) -> Any:
     """Sparse matrix from moduli at the points (9 points, of fibres points) to those between samples
     (nq)."""
-    return _to_moduli(t.pattern, t.weights.shape[1], t.along.tobytes())
-
-
-@lru_cache(64)
-def _to_moduli(pattern, points, along):
     from scipy import sparse
 
     (s, z), A = pattern.pairs, np.frombuffer(along).reshape(-1, points, pattern.ns)
@@ -254,14 +250,18 @@ class Elements:
         return S
 
     @cached_property
+    def _reach_of_pairs(self):
+        return None if self.reach is None else self.reach[self.t.pairs].prod(axis=0)
+
+    @cached_property
     def _to_moduli(self):
         """Sparse matrix from moduli at the points (9 points) to those between samples (nq)."""
-        return to_moduli(self.t)
+        return to_moduli(self.t.pattern, self.t.weights.shape[1], self.t.along.tobytes())
 
     def _moduli_of_samples(self, D):
         """Moduli (nq, ne) between samples from those at the points, as if they were symmetric."""
         D = self._to_moduli @ (D * self.weights).reshape(-1, self.ne)
-        return D if self.reach is None else self.reach[self.t.pairs].prod(axis=0) * D
+        return D if self.reach is None else self._reach_of_pairs * D
 
     def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
         """Weighted stresses (ns, ne), and moduli (nq, ne) between samples."""

@@ -310,8 +310,8 @@ def remembering(elements: Sequence[Elements], past: Past) -> list[Elements]:
 #: Relative difference of strains that is round-off.
 SAME = 1e-12
 #: What copies of elements share.
-CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_ends", "_products",
-            "_signs", "_at_band")
+CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_reach_of_pairs", "_ends",
+            "_products", "_signs", "_at_band")
 
 
 class ElementsWithHistory(Elements):
