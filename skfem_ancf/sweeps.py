@@ -1,7 +1,5 @@
 """Sweeps over parameters: an ordered map over threads, processes or a cluster."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import pickle

@@ -1,7 +1,5 @@
 """What the equations of a scene see of items: forces and constraints on degrees of freedom."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -304,7 +302,7 @@ class Remembering:
     def __repr__(self) -> str:
         return repr(self.element)
 
-    def after(self, history: Array, span: Array) -> Remembering:
+    def after(self, history: Array, span: Array) -> "Remembering":
         """A copy at another history and span, of which it has views."""
         other = object.__new__(Remembering)
         vars(other).update(vars(self))
@@ -379,7 +377,7 @@ class Remembering:
         self.values[:] = self.element.sample(positions(self, u), w, t,
                                               self.start if first else self.history)
 
-    def take_over(self, other: Remembering) -> None:
+    def take_over(self, other: "Remembering") -> None:
         """Set the history to that of the same element in other equations."""
         self.values[:] = other.history
 

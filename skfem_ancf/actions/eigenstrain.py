@@ -3,8 +3,6 @@
 load with the initial stress -S0. E0 is sampled and interpolated as the formulation does with E. For
 other laws see :mod:`skfem_ancf.actions.eigenstrain`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, ClassVar, cast
@@ -370,7 +368,7 @@ def _resultants(beam, eigen, rules):
 
 
 def products(name: str, function: Callable[..., Any], beam: Beam
-             ) -> list[tuple[Callable[..., Any], Coefficient]]:
+             ) -> "list[tuple[Callable[..., Any], Coefficient]]":
     """A function (x, y, t) as a sum of products of functions of (x, y) and of t, exact where such a
     sum exists: by empirical interpolation at some times and as many places (Barrault, Maday,
     Nguyen, Patera: "An empirical interpolation method", Comptes Rendus Mathematique 339 (2004))."""
@@ -412,7 +410,7 @@ class Coefficient:
         self.name, self.function, self.x, self.y, self.weights = name, function, x, y, weights
         self.amplitude = amplitude
 
-    def times(self, amplitude: TimeFunction) -> Coefficient:
+    def times(self, amplitude: TimeFunction) -> "Coefficient":
         """The product with a function of time."""
         return Coefficient(self.name, self.function, self.x, self.y, self.weights, amplitude)
 

@@ -1,7 +1,5 @@
 """A scikit-fem LinearForm as a load."""
 
-from __future__ import annotations
-
 import logging
 import re
 from typing import Any

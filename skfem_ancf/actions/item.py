@@ -1,7 +1,5 @@
 """Protocol of all items of a scene."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterable, Sequence
 from os import urandom
@@ -89,13 +87,13 @@ class Item(Immutable, Bound):
     dissipates = True
     dofs: Any = None
 
-    def __new__(cls, *args: Any, **options: Any) -> Self:
+    def __new__(cls, *args: Any, **options: Any) -> "Self":
         made = super().__new__(cls)
         #: identifies copies: bound ones, on another mesh, in another process
         vars(made)["_key"] = urandom(16)
         return made
 
-    def expand(self, layout: Layout) -> Sequence[Item]:
+    def expand(self, layout: Layout) -> "Sequence[Item]":
         """The items it consists of: itself, or one for each of several beams."""
         return (self,)
 

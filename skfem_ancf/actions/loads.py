@@ -1,7 +1,5 @@
 """Loads: force on the degrees of freedom of a beam, its derivative, and its potential."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
 from typing import Any, cast
@@ -154,12 +152,12 @@ class Load(Item):
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
         return self.at_rest if t is None else 1.0 if self.amplitude is None else self.amplitude(t)
 
-    def times(self, factor: float) -> Load:
+    def times(self, factor: float) -> "Load":
         """A copy with a factor, in statics and over time."""
         return self._with(at_rest=factor * self.at_rest, amplitude=Amplitude(
             partial(_factored, factor, self.amplitude)))
 
-    def factor_and_load(self, t: float | None) -> tuple[float, Load]:
+    def factor_and_load(self, t: float | None) -> "tuple[float, Load]":
         """Factor and load at time ``t``; None in statics."""
         return self.factor(t), self
 

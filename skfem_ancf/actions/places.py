@@ -1,7 +1,5 @@
 """Material points, sections and points of the ground, as functions of the DOFs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -28,7 +26,7 @@ class Vector:
         self.dofs = np.zeros((2, 0), dtype=int) if dofs is None else dofs
         self.weights = weights + np.zeros(self.dofs.shape)
 
-    def __sub__(self, other: Vector) -> Vector:
+    def __sub__(self, other: "Vector") -> "Vector":
         return Vector(self.start - other.start, np.hstack([other.dofs, self.dofs]),
                       np.hstack([-other.weights, self.weights]))
 

@@ -1,7 +1,5 @@
 """Forces on material points, at rest or moving, dead or follower, on the axis or off it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, cast
 

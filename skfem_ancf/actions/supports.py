@@ -1,7 +1,5 @@
 """Supports: prescribed degrees of freedom."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -52,7 +50,7 @@ class Support(Item):
             return (self,)
         return (PrescribedDisplacement(self.boundary, self.names, self.displacement, self.beam),)
 
-    def bind(self, layout: Layout) -> Support:
+    def bind(self, layout: Layout) -> "Support":
         beam, first = layout.beam(self.beam), layout.offset(self.beam)
         return self._with(dofs=beam.dofs(self.boundary, self.names) + first, _member=(beam, first))
 

@@ -1,7 +1,5 @@
 """Symbols in pictures: what :meth:`~skfem_ancf.Item.symbols` of loads, supports, joints return."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 

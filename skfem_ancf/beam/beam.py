@@ -1,7 +1,5 @@
 """A beam: a mesh, an element, a material and a formulation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -148,7 +146,7 @@ class Beam(Immutable):
         return (f"<Beam {self.name or ''}: {self.mesh.nelements} elements of order "
                 f"{self.element.order}, {self.N} degrees of freedom, {self.formulation.name}>")
 
-    def replace(self, **changes: Any) -> Beam:
+    def replace(self, **changes: Any) -> "Beam":
         """A copy with some arguments of the constructor changed.
 
         Examples

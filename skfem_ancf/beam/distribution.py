@@ -1,7 +1,5 @@
 """Points on the surface of a beam, and distribution of forces on it, its volume and sections."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -44,7 +42,7 @@ class Sampled:
     eta: Array | None = None  # for a body points across, (q,)
     parts: Array | None = None  # begin and end of parts of elements in order, (2, n), or all
 
-    def times(self, factor: Any) -> Sampled:
+    def times(self, factor: Any) -> "Sampled":
         """The density times a factor or several, shape (...)."""
         return replace(self, values=np.moveaxis(np.multiply.outer(factor, self.values),
                                                 np.ndim(factor), 0))

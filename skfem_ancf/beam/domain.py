@@ -1,8 +1,6 @@
 """Two-dimensional bodies: a basis of scikit-fem with its forms, and weak forms of hyperelastic
 bodies for all local functions at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -234,7 +232,7 @@ class Domain(Immutable):
 
     @classmethod
     def solid(cls, basis: Basis, material: Material, width: float = 1.0,
-              name: str | None = None) -> Domain:
+              name: str | None = None) -> "Domain":
         """A domain of a material of the package or a user-defined one, with stress in results.
 
         Raises InputError if the material has a history.

@@ -1,8 +1,6 @@
 """Kinematics of sections. With sections, positions are linear in the DOFs. Sections of a cable stay
 normal to the axis and contract so that S_yy = 0."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -2,8 +2,6 @@
 given by its position (x, y) in the reference configuration, a tuple, a list or an array of two
 numbers. Several points are an array (2, n), as in scikit-fem, or a list of points."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any, TypeAlias

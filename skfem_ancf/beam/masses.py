@@ -1,7 +1,5 @@
 """Mass of a beam: shape functions and masses at points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple

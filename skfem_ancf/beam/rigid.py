@@ -1,7 +1,5 @@
 """A planar rigid body."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -111,7 +109,7 @@ class RigidBody(Immutable):
         return (f"<RigidBody {who}of mass {self.mass:g} and inertia {self.inertia:g} at "
                 f"({self.position[0]:g}, {self.position[1]:g})>")
 
-    def replace(self, **changes: Any) -> RigidBody:
+    def replace(self, **changes: Any) -> "RigidBody":
         """A copy with some arguments of the constructor changed, as ``mass=2.0``."""
         return rebuilt(self, changes)
 

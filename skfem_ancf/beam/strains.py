@@ -2,8 +2,6 @@
 are linear between the integration points, also across the section: at the edge of a plastic zone
 the stress has a kink, at which polynomials oscillate; and it is no function of the strain alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any

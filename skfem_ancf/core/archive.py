@@ -1,7 +1,5 @@
 """Files of named arrays, written atomically."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import zipfile

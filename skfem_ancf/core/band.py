@@ -3,8 +3,6 @@ entry (i, j) at ``j * ld + i - j``, with :data:`SPARE` zeros after each column; 
 replace it. Unsymmetric (``top`` > 0): entry (i, j) at ``j * ld + top + i - j``, the storage of
 LAPACK's ``gbtrf``, whose factors replace it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -73,7 +71,7 @@ class BandMatrix(Band):
     factors: Any = None  # a Band
 
     @classmethod
-    def zeros(cls, n: int, width: int, symmetric: bool = True) -> BandMatrix:
+    def zeros(cls, n: int, width: int, symmetric: bool = True) -> "BandMatrix":
         """A zero matrix (n, n) with ``width`` subdiagonals; the lower half only if symmetric."""
         top = 0 if symmetric else 2 * width  # space for the fill-in of gbtrf
         ld = top + width + 1 if top else width + 1 + SPARE
@@ -138,14 +136,14 @@ class BandMatrix(Band):
         multiply(self, v, out)
         return out
 
-    def combine(self, a: float, A: BandMatrix, b: float, B: BandMatrix) -> BandMatrix:
+    def combine(self, a: float, A: "BandMatrix", b: float, B: "BandMatrix") -> "BandMatrix":
         """Set to ``a A + b B``."""
         np.multiply(A.flat, a, out=self.flat)
         self.flat[:] += b * B.flat
         self.factors = None
         return self
 
-    def factorize(self) -> BandMatrix:
+    def factorize(self) -> "BandMatrix":
         """Factorise; LinAlgError if the matrix is singular."""
         if self.symmetric:
             self.factors = Band(self.flat.copy(), *self[1:5])
@@ -157,7 +155,7 @@ class BandMatrix(Band):
         self.factors = general
         return self
 
-    def general(self) -> BandMatrix:
+    def general(self) -> "BandMatrix":
         """A copy with both halves stored."""
         out = BandMatrix.zeros(self.n, self.width, symmetric=False)
         add_scaled(self, 0.0, out)
@@ -224,7 +222,7 @@ class BandMatrix(Band):
                 P = np.block([[P, E], [E.T, A]])
                 last = after
 
-    def shifted(self, shift: float) -> BandMatrix:
+    def shifted(self, shift: float) -> "BandMatrix":
         """The matrix plus ``shift`` times the absolute diagonal."""
         out = self._replace(flat=self.flat.copy())
         out.flat[self.top::self.ld] += shift * np.abs(self.diagonal())
@@ -248,7 +246,7 @@ class BandMatrix(Band):
             odd += np.sum(lu.pivots != np.arange(self.n))
         return -1 if odd % 2 else 1
 
-    def symmetric_part(self) -> BandMatrix:
+    def symmetric_part(self) -> "BandMatrix":
         """(A + A^T) / 2 as a symmetric band matrix."""
         out, A = BandMatrix.zeros(self.n, self.width), self.tocsc()
         S = sparse.tril(0.5 * (A + A.T))

@@ -1,8 +1,6 @@
 """Whether Numba is used, and the cache of compiled code on disk; without importing Numba, which is
 slow."""
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import logging

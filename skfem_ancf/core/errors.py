@@ -2,8 +2,6 @@
 about input are also ``ValueError``. The functions ``require_...`` return their argument, converted,
 or raise an :class:`InputError`; ``name`` is the argument's name in the message."""
 
-from __future__ import annotations
-
 import contextlib
 import difflib
 import importlib

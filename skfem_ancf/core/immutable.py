@@ -1,7 +1,5 @@
 """Immutable objects, how they are copied and pickled, and caches of what is computed from them."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import sys

@@ -3,8 +3,6 @@ Marked functions are registered with ``numba.extending``. Functions that are cal
 by address, are cached on disk. Numba compiles a function again in each caller; large parts are
 therefore called by address."""
 
-from __future__ import annotations
-
 import pickle
 from ctypes import CFUNCTYPE, c_double, c_int64, c_void_p, cast
 from functools import cache

@@ -13,8 +13,6 @@ References
 40 (1998).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

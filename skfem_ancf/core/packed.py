@@ -1,8 +1,6 @@
 """Named tuples as flat arrays of 64-bit words, which compiled code receives by address. A number is
 one word; an array is its address and shape; a tuple is the words of its fields."""
 
-from __future__ import annotations
-
 from array import array
 from ctypes import addressof, c_char
 from functools import cache

@@ -1,7 +1,5 @@
 """Progress bars by tqdm, if installed."""
 
-from __future__ import annotations
-
 import sys
 from contextlib import AbstractContextManager, nullcontext
 from types import SimpleNamespace

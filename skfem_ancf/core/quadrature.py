@@ -1,7 +1,5 @@
 """Gauss rules along the axis and across the section of the reference cell; polynomials on it."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import comb, perm
 

@@ -1,7 +1,5 @@
 """Types for annotations."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
@@ -12,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 Array: TypeAlias = NDArray[Any]
 
 #: An argument of :func:`skfem_ancf.mesh.places.facets_of`.
-Place: TypeAlias = "str | ArrayLike | Callable[[Array], Array]"
+Place: TypeAlias = str | ArrayLike | Callable[[Array], Array]
 
 #: The amplitude of a force: a function of time, or None.
-TimeFunction: TypeAlias = "Callable[[float], float] | None"
+TimeFunction: TypeAlias = Callable[[float], float] | None
 
 #: The name of a file.
-StrPath: TypeAlias = "str | os.PathLike[str]"
+StrPath: TypeAlias = str | os.PathLike[str]
 
 #: Points and weights of a rule on [0, 1].
 Rule: TypeAlias = tuple[Array, Array]

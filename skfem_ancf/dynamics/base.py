@@ -1,7 +1,5 @@
 """The state of a motion at an instant, the base class of schemes, differences in time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
@@ -67,7 +65,7 @@ class Motion:
     turns: Array | None = None
     memory: dict[str, Any] | None = None
     start: Array | None = None
-    parts: list[Motion] | None = None
+    parts: "list[Motion] | None" = None
 
 
 class Motions(Sequence[Motion]):

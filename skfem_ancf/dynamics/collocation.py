@@ -1,7 +1,5 @@
 """Collocation: Gauss and Radau methods of high order."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from math import factorial

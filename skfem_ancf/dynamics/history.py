@@ -1,7 +1,5 @@
 """The result of a time integration, its momentum and its energy."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Time integration, and its checkpoints: files from which a motion continues."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Sequence
@@ -87,7 +85,7 @@ def integrate(system: System, scheme: Scheme, start: State | None, u: Array | No
     return history
 
 
-def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:
+def follow(run: Run, file: "Checkpoint | None" = None, progress: bool | None = None) -> History:
     """Take all steps of a Run; warn about inverted elements and deep contact."""
     history, inverted = _go(run, file, progress)
     contacts = run.system.forces.contacts

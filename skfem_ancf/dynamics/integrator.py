@@ -1,7 +1,5 @@
 """One-step integration: blocks of steps, single steps, and halved steps after a failure."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from contextlib import suppress
@@ -158,7 +156,7 @@ class Integrator:
         """True if the iteration matrix is factorised."""
         return bool(self._state.factors[0] != 0)
 
-    def count(self, other: Integrator) -> None:
+    def count(self, other: "Integrator") -> None:
         """Add the counts of another integrator, and reset those."""
         self._state.iterations[:] += other._state.iterations
         self._state.factorizations[:] += other._state.factorizations

@@ -1,7 +1,5 @@
 """Named tuples of time steps, joint rates and low-rank rows beside the band."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 import numpy as np

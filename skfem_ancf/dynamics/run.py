@@ -1,7 +1,5 @@
 """The loop over the steps of a motion: step sizes, breakpoints, events, storage, restart."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, ulp

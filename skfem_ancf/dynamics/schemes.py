@@ -1,8 +1,6 @@
 """The energy-momentum schemes and the generalised-alpha family, schemes by name, and the choice of
 one by ``scheme="auto"``."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

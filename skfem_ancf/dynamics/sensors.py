@@ -1,7 +1,5 @@
 """Sensors: quantities that are recorded at every step."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path as FilePath

@@ -2,8 +2,6 @@
 of a polynomial through samples within one step. Samples outside of the step are not used, so that a
 kink at the end of a step does not spoil the rates of its neighbours."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The ANCF elements of order N, of all degrees along the axis, the cable, and a choice of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -138,7 +136,7 @@ class ElementBeamANCFHermite(ElementBeamANCF):
         self._slopes, self._points = require_degree(degree) // 2, points
         super().__init__(order, points)
 
-    def raised(self) -> ElementBeamANCFHermite | None:
+    def raised(self) -> "ElementBeamANCFHermite | None":
         # ElementBeamANCFCubic belongs to this family; user-defined subclasses do not
         if not is_builtin(self) or self.axis_degree == DEGREES[-1]:
             return None
@@ -220,7 +218,7 @@ class ElementBeamCable(ElementBeam):
                          [(0.0, k, 0) for k in range(2, m)], [])
         self.maxdeg = self.axis_degree
 
-    def raised(self) -> ElementBeamCable | None:
+    def raised(self) -> "ElementBeamCable | None":
         if type(self) is not ElementBeamCable or self.axis_degree == DEGREES[-1]:
             return None
         return ElementBeamCable(self.axis_degree + 2)

@@ -1,7 +1,5 @@
 """Base class of beam elements, and where their strain is sampled."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -191,7 +189,7 @@ class ElementBeam(Immutable, Element):
         # degree 8 along the axis and 4 N across the section
         self.maxdeg = max(self.strain_degree, 2 * self.section.degree)
 
-    def measured(self, measure: Any, shear: float | None = None) -> ElementBeam:
+    def measured(self, measure: Any, shear: float | None = None) -> "ElementBeam":
         """The element for a section with given quadrature, as formulations take it.
 
         Parameters
@@ -204,12 +202,12 @@ class ElementBeam(Immutable, Element):
         other._freeze()
         return other
 
-    def raised(self) -> ElementBeam | None:
+    def raised(self) -> "ElementBeam | None":
         """The element of the next degree along the axis, or None: for ``solve_static(adapt=...)``.
         """
         return None
 
-    def plane(self) -> ElementBeam | None:
+    def plane(self) -> "ElementBeam | None":
         """The element of order 1 with the same axis, or None: for sections that stay plane."""
         return None
 

@@ -1,7 +1,5 @@
 """The choice between NumPy and compiled kernels."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -78,7 +76,7 @@ class Backend:
                            "HistoryMaterial with a method point, is compiled")
 
     @cached_property
-    def linearised(self) -> Backend | None:
+    def linearised(self) -> "Backend | None":
         """The backend for :attr:`Tables.linearised`, or None."""
         if self._base is not None:
             base = self._base.linearised
@@ -86,24 +84,24 @@ class Backend:
         tables = self.tables.linearised
         return None if tables is None else self.with_tables(tables)
 
-    def elastic_from(self, u: Array) -> Backend:
+    def elastic_from(self, u: Array) -> "Backend":
         """The backend for :meth:`Tables.elastic_from`."""
         return self.after(self.tables.elastic_from(u))
 
-    def with_tables(self, tables: Tables) -> Backend:
+    def with_tables(self, tables: Tables) -> "Backend":
         """A copy for other tables."""
         backend = copy(self)
         backend.tables, backend._flat, backend._base, backend._copied = tables, None, None, {}
         vars(backend).pop("linearised", None)
         return backend
 
-    def copied(self, n: int) -> Backend:
+    def copied(self, n: int) -> "Backend":
         """That of the tables for n displacements at once, see :meth:`Tables.copied`."""
         if n not in self._copied:
             self._copied[n] = self.with_tables(self.tables.copied(n))
         return self._copied[n]
 
-    def after(self, tables: Tables) -> Backend:
+    def after(self, tables: Tables) -> "Backend":
         """A copy for tables that differ in the history alone, see :meth:`Tables.after`."""
         backend = self.with_tables(tables)
         backend._base = self

@@ -5,8 +5,6 @@ those of the node plus the residual of the joint equations. Multipliers are ther
 they are the residual forces at the ends. Statics, modes and time integration use the same
 factors."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Supports and joints: fixed degrees of freedom, and equations with Lagrange multipliers."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy

@@ -17,8 +17,6 @@ of earlier steps, it is then the last one, or :data:`EXPECTED` of new factors. T
 second test, since another residual costs as much as another iteration.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Histories: what the forces of a scene remember of its past."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from itertools import accumulate
@@ -71,7 +69,7 @@ class Histories:
         """That of the laws of a beam; None for elastic ones."""
         return self._past(self._parts[id(beam)]) if id(beam) in self._parts else None
 
-    def after(self, history: Array | None, span: float = 0.0) -> Histories:
+    def after(self, history: Array | None, span: float = 0.0) -> "Histories":
         """A copy with another history, by default that at rest, and the time since."""
         other = copy(self)
         other._have(self.forces, self.of_forces.size, history, span)

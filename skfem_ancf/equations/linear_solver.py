@@ -3,8 +3,6 @@ ways: LAPACK for a band matrix alone; a Schur complement for few multipliers and
 sparse LU on the null space of J, also for entries outside of the band; static condensation for
 frames. Systems with the mass matrix, and modal damping."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from copy import copy
@@ -35,7 +33,7 @@ ROUGH = 1e-8
 class Last:
     """The last factors of a matrix that is more than a band, and its groups of equations."""
 
-    factors: Alone | Schur | NullSpace | None = None
+    factors: "Alone | Schur | NullSpace | None" = None
     _of: Any = None
 
     def blocks(self, rows: Array, columns: Array, m: int, n: int) -> list[Block]:
@@ -62,7 +60,7 @@ class LinearSolver:
         if not self.coupled:
             self.keep_band()
 
-    def after(self, system: Any) -> LinearSolver:
+    def after(self, system: Any) -> "LinearSolver":
         """A copy for a system with another history; matrices and factors are shared."""
         _ = self.condensed, self._supports
         other = copy(self)

@@ -3,8 +3,6 @@ entries of an assembled tangent add axial and shear stiffness E A to the bending
 L^2, which is below their round-off from L / h = 1e8 on. Summing the strains ``B x`` first avoids
 the cancellation."""
 
-from __future__ import annotations
-
 import logging
 from copy import copy
 from typing import Any, NamedTuple, cast

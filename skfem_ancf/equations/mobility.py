@@ -1,7 +1,5 @@
 """Unconstrained rigid motions, redundant joints, and their description."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rank, null spaces and inertia of sparse matrices."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The discrete equations of a scene: forces, tangent, mass and constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import wraps
 from itertools import accumulate, count, pairwise
@@ -135,7 +133,7 @@ class System:
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
                  joints: Sequence[BoundConstraint] = (), damping: Damping | None = None,
                  elements: Sequence[BoundForce] = (), bodies: Sequence[RigidBody] = (),
-                 rest_modes: Callable[[System, int], tuple[Array, Array]] | None = None,
+                 rest_modes: "Callable[[System, int], tuple[Array, Array]] | None" = None,
                  domains: Sequence[Domain] = ()) -> None:
         self._given: tuple[Any, ...] = (
             tuple(beams), tuple(loads), fixed, values, tuple(joints), damping, tuple(elements),
@@ -195,7 +193,7 @@ class System:
     def __deepcopy__(self, memo):
         return self
 
-    def after(self, history: Array | None = None, span: float = 0.0) -> System:
+    def after(self, history: Array | None = None, span: float = 0.0) -> "System":
         """The equations after a history (n,), by default at rest, for an increment of a time span.
         It is a system of its own, which a search in contact or the kernels of steps may change; all
         that no history changes is shared."""
@@ -209,7 +207,7 @@ class System:
         other.forces = other.histories.forces
         return other
 
-    def recycled(self, history: Array | None, span: float) -> System:
+    def recycled(self, history: Array | None, span: float) -> "System":
         """:meth:`after` for an increment, in the arrays of an earlier one if there was one: its
         tables for compiled code, and what it knows about where nothing touches, stay."""
         if not self.histories.values.size:
@@ -228,7 +226,7 @@ class System:
         if self._whole is not None and self.histories is not self._whole.histories:
             vars(self._whole)["_spare"] = self
 
-    def sticking(self) -> System:
+    def sticking(self) -> "System":
         """The equations in whose tangents all points that touch an obstacle stick."""
         if not self.forces.contacts.anchored:
             return self
@@ -273,7 +271,7 @@ class System:
 
     # loads
 
-    def at(self, t: float) -> System:
+    def at(self, t: float) -> "System":
         """The equations in which functions of time are those at t in statics."""
         other = object.__new__(System)
         vars(other).update(vars(self), clock=t, backend=self.backend, solver=self.solver,

@@ -28,8 +28,6 @@ The strain is the Green-Lagrange strain ``(F^T F - 1) / 2`` in the beam's frame 
 ``F = grad r``, and S is the second Piola-Kirchhoff stress.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, NamedTuple

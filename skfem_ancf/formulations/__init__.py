@@ -2,8 +2,6 @@
 one is a file beside this one, with a class derived from :class:`Formulation`, and a line in
 :data:`FORMULATIONS`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache

@@ -1,7 +1,5 @@
 """Files for ParaView, one state as .vtu, a series of them as .pvd; fields as xarray data sets."""
 
-from __future__ import annotations
-
 import logging
 import re
 from pathlib import Path

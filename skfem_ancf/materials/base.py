@@ -1,7 +1,5 @@
 """Interface of constitutive laws: energy, stress and moduli from the Green-Lagrange strain."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -87,7 +85,7 @@ class Material(Immutable):
             self.strength = require_positive("strength", strength)
 
     @classmethod
-    def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> Self:
+    def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> "Self":
         """A material of this law with the values of a common one.
 
         E, nu, density, thermal expansion and strength (yield or proof stress) are those of
@@ -131,7 +129,7 @@ class Material(Immutable):
         """True if the modulus or the density is a function of material coordinates."""
         return callable(self.E) or callable(self.density)
 
-    def reference(self) -> tuple[Material, Callable[..., Any] | None]:
+    def reference(self) -> "tuple[Material, Callable[..., Any] | None]":
         """The material with E = 1, and the function E(x, y); ``(self, None)`` for a number E."""
         return (self.replace(E=1.0), self.E) if callable(self.E) else (self, None)
 
@@ -163,7 +161,7 @@ class Material(Immutable):
             return 1.0
         return rectangle
 
-    def replace(self, **changes: Any) -> Material:
+    def replace(self, **changes: Any) -> "Material":
         """A copy with changed constructor arguments, as ``replace(E=2e8)``.
 
         Raises NameUnknown if an argument is not known.

@@ -1,7 +1,5 @@
 """Damping of materials and of a whole scene."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core import ArrayLike, Immutable, refuse, require_finite, require_not_negative

@@ -1,7 +1,5 @@
 """Von Mises plasticity with isotropic and kinematic hardening."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -112,7 +110,7 @@ class ElasticPlastic(HistoryMaterial):
         self.hardening = self._checked(hardening)
 
     @classmethod
-    def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> Self:
+    def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> "Self":
         """As :meth:`Material.named <skfem_ancf.materials.base.Material.named>`; the yield stress is
         the strength.
 

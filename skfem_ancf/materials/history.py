@@ -1,7 +1,5 @@
 """Materials whose stress depends on the path of the strain."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -36,7 +34,7 @@ class AtRest(LinearLaw):
     """The moduli of a material with a history at zero strain, for what knows no history.
     ``material`` is the material, ``scale`` (3,) the factors of strain and stress for shear."""
 
-    def __init__(self, material: HistoryMaterial, k_s: float) -> None:
+    def __init__(self, material: "HistoryMaterial", k_s: float) -> None:
         self.material, self.scale = material, np.array([1.0, 1.0, np.sqrt(k_s)])
         super().__init__(material.elastic * np.outer(self.scale, self.scale))
 

@@ -3,8 +3,6 @@
 are typical values at room temperature, as data sheets state them: they vary with grade, moisture,
 temperature, rate and direction of printing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..core import require_option, retold

@@ -1,7 +1,5 @@
 """Compressible neo-Hookean material."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core import Array, Law, everywhere, primitive, refuse, source

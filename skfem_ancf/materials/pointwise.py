@@ -1,7 +1,5 @@
 """Laws given at one point, which can be compiled, and that of beams given by stiffnesses."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

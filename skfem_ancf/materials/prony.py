@@ -1,7 +1,5 @@
 """Viscoelasticity by a Prony series."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """St. Venant-Kirchhoff: stress linear in the Green-Lagrange strain."""
 
-from __future__ import annotations
-
 from typing import cast
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The smooth axis of a curved beam: a function of a parameter, or a spline of points."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from functools import partial
@@ -156,7 +154,7 @@ class Curve:
         bent = np.abs(_angles(d_fine[:, :-2:2], d_fine[:, 2::2])) / pieces
         return p.copy(), here / np.hypot(*here), lengths, self.turning(s), bent
 
-    def moved(self, A: Array, shift: Array) -> Curve:
+    def moved(self, A: Array, shift: Array) -> "Curve":
         """The curve ``A r(s) + shift``."""
         return Curve(partial(_moved, self, A, shift), partial(_moved, self.rate, A, np.zeros(2)),
                      self.ends)

@@ -1,7 +1,5 @@
 """Frames from meshio meshes and DXF drawings: each line cell is a line."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Sequence

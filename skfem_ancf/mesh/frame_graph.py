@@ -1,7 +1,5 @@
 """The graph of a frame, lines between points of the plane, and meshes of its lines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, cast
@@ -124,7 +122,7 @@ class Axes:
             out[here] = arc.lengths(x[here], y[here])
         return out
 
-    def moved(self, A: Array, shift: Array) -> Axes:
+    def moved(self, A: Array, shift: Array) -> "Axes":
         return Axes({k: arc.moved(A, shift) for k, arc in self.arcs.items()},
                     A @ self.start + shift[:, None], A @ self.chord)
 

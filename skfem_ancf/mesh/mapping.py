@@ -1,7 +1,5 @@
 """The map from the reference cell to the reference configuration, tapers, nodal values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import factorial, perm
 from typing import Any

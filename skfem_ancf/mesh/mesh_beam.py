@@ -1,7 +1,5 @@
 """Meshes of planar beams: nodes along the axis, and the height of the section."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -106,7 +104,7 @@ class MeshBeam(NumberedMesh):
 
     @classmethod
     def init_line(cls, x: ArrayLike, height: float | Callable[[Array], ArrayLike],
-                  origin: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> MeshBeam:
+                  origin: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> "MeshBeam":
         """A straight beam.
 
         Raises MeshError if ``x`` does not increase, or a height is not positive.
@@ -144,7 +142,7 @@ class MeshBeam(NumberedMesh):
     @classmethod
     def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike,
                    height: float | Callable[[Array], ArrayLike],
-                   dr: Callable[[Array], ArrayLike] | None = None) -> MeshBeam:
+                   dr: Callable[[Array], ArrayLike] | None = None) -> "MeshBeam":
         """A beam with a curved reference configuration.
 
         The axis of an element is the cubic through its end points with the unit tangents and the
@@ -195,7 +193,7 @@ class MeshBeam(NumberedMesh):
     @classmethod
     def from_points(cls, points: ArrayLike | StrPath,
                     height: float | Callable[[Array], ArrayLike], elements: int | None = None,
-                    noise: float = 0.0) -> MeshBeam:
+                    noise: float = 0.0) -> "MeshBeam":
         """A beam whose axis is a cubic spline through points, as of a drawing or a measurement.
 
         Where a closed curve ends, weld the ends: ``scene.weld((beam, "left"), (beam, "right"))``.
@@ -258,7 +256,7 @@ class MeshBeam(NumberedMesh):
         return made
 
     @classmethod
-    def init_refdom(cls) -> MeshBeam:
+    def init_refdom(cls) -> "MeshBeam":
         return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
 
     def __post_init__(self):
@@ -307,7 +305,7 @@ class MeshBeam(NumberedMesh):
                    "{} to {} has no length", *p[:, t].swapaxes(0, 1), error=MeshError)
         MappingBeam(self).check()  # before its arrays are copied: not the mapping that is kept
 
-    def with_sections(self, sections: str) -> MeshBeam:
+    def with_sections(self, sections: str) -> "MeshBeam":
         """The mesh with section directors interpolated "linear", "cubic", ... along the axis.
 
         The names are those of :data:`skfem_ancf.mesh.mapping.SECTIONS`. From "quintic" on
@@ -320,7 +318,7 @@ class MeshBeam(NumberedMesh):
             return self
         return replace(self, sections=sections)
 
-    def replace(self, **changes: Any) -> MeshBeam:
+    def replace(self, **changes: Any) -> "MeshBeam":
         """The mesh with another ``height``, a number or a function, or without its ``curve``.
 
         Positions, tangents and lengths depend on each other: to change them use :meth:`init_line`,
@@ -437,7 +435,7 @@ class MeshBeam(NumberedMesh):
     def _uniform(self):  # scikit-fem's finder of elements on surfaces calls it
         return halved(self, np.arange(self.nelements))
 
-    def refined(self, times_or_ix: Any = 1) -> MeshBeam:
+    def refined(self, times_or_ix: Any = 1) -> "MeshBeam":
         """A finer mesh with the same named boundaries and subdomains; new nodes are on the curve.
 
         Parameters
@@ -454,7 +452,7 @@ class MeshBeam(NumberedMesh):
         return halved(self, np.unique(self.normalize_elements(times_or_ix)))
 
     def graded(self, at: Any = ("left",), size: float | None = None,
-               growth: float = 0.5) -> MeshBeam:
+               growth: float = 0.5) -> "MeshBeam":
         """A mesh refined near sections, to resolve boundary layers at supports and loads.
 
         Elements are halved until those within 1.5 heights of the sections are not longer than
@@ -547,11 +545,11 @@ class MeshBeam(NumberedMesh):
                        heights=None if self.heights is None else scale * self.heights,
                        taper=None if self.taper is None else partial(scaled, self.taper, scale))
 
-    def translated(self, diffs: ArrayLike) -> MeshBeam:
+    def translated(self, diffs: ArrayLike) -> "MeshBeam":
         """The mesh translated by a vector, shape (2,)."""
         return self._moved(np.eye(2), require_finite("the shift", diffs, (2,)))
 
-    def rotated(self, angle: float, about: ArrayLike = (0.0, 0.0)) -> MeshBeam:
+    def rotated(self, angle: float, about: ArrayLike = (0.0, 0.0)) -> "MeshBeam":
         """The mesh rotated about a point.
 
         Parameters
@@ -564,7 +562,7 @@ class MeshBeam(NumberedMesh):
         Q = np.array([[c, -s], [s, c]])
         return self._moved(Q, about - Q @ about)
 
-    def scaled(self, factors: ArrayLike) -> MeshBeam:
+    def scaled(self, factors: ArrayLike) -> "MeshBeam":
         """The mesh and its height scaled by a positive number, or several equal ones (n,)."""
         f = np.unique(require_finite("factors", factors))
         refuse(len(f) != 1 or f[0] <= 0, "a beam is scaled by one positive factor, got {!r}",
@@ -630,7 +628,7 @@ class MeshBeam(NumberedMesh):
             archive.write(path, content)
 
     @classmethod
-    def load_npz(cls, filename: StrPath) -> MeshBeam:
+    def load_npz(cls, filename: StrPath) -> "MeshBeam":
         """Load a mesh saved by :meth:`save_npz`, without executing anything in the file.
 
         Raises
@@ -685,7 +683,7 @@ class MeshBeam(NumberedMesh):
             self.to_meshquad().save(new, point_data, cell_data, **kwargs)
 
     @classmethod
-    def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
+    def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> "MeshBeam":
         """Load a mesh that :meth:`save` wrote as ``.npz``.
 
         Parameters

@@ -1,7 +1,5 @@
 """Chains of elements: the reference cell, numbers and names of facets and elements, refinement."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from types import MappingProxyType

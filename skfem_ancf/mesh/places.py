@@ -1,7 +1,5 @@
 """Places on a beam: a boundary, a material point, a function, facets; the location of points."""
 
-from __future__ import annotations
-
 import numbers
 from collections.abc import Callable
 from math import factorial

@@ -2,8 +2,6 @@
 sign and components of each field. A user-defined field is a function of :class:`Values`, or a
 :class:`Field` made from one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -59,7 +57,7 @@ class Field:
     """
 
     name: str
-    function: Callable[[Values], Any]
+    function: "Callable[[Values], Any]"
     title: str = ""
     unit: str = ""
     signed: bool = True
@@ -89,7 +87,7 @@ class Field:
         name = "" if self.name == "lambda" else self.name
         return formula.group() if formula else self.title or name
 
-    def of(self, values: Values) -> Array:
+    def of(self, values: "Values") -> Array:
         """The field at the points of Values, (n,) or (components, n)."""
         own = FIELDS.get(self.name) is not self
         out = ask("the function of a field", self.function, values) if own else (

@@ -1,7 +1,5 @@
 """Members of a deformed configuration as points, cells and arrays, for plots and files."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Sequence

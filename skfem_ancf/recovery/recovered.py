@@ -19,8 +19,6 @@ recovered fields are found for each axial segment between jumps of the section f
    sections cubic along the axis, the Gauss points).
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -164,7 +162,7 @@ class Segment:
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
         self._solve()
 
-    def part(self, k: int) -> Segment:
+    def part(self, k: int) -> "Segment":
         """The segment at instant k of several."""
         one = copy.copy(self)
         vars(one).pop("result", None)
@@ -506,7 +504,7 @@ class Recovery:
         return parts
 
     @classmethod
-    def together(cls, forces: Sequence[SectionForces], u: Sequence[Array]) -> list[Recovery]:
+    def together(cls, forces: Sequence[SectionForces], u: Sequence[Array]) -> "list[Recovery]":
         """The recovered fields of several instants, together if cuts are the same."""
         if len(forces) > 1 and all(one.beam is forces[0].beam and np.array_equal(
                 one.cuts, forces[0].cuts) for one in forces):

@@ -1,7 +1,5 @@
 """Section forces and axial strains of a beam."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -117,7 +115,7 @@ class Resultants:
         return pandas.DataFrame({name: np.broadcast_to(values, shape).ravel()
                                  for name, values in columns.items()}, index)
 
-    def first(self) -> Resultants:
+    def first(self) -> "Resultants":
         """The first section, without the axis n."""
         values: dict[str, Any] = {
             f.name: value if isinstance(value := getattr(self, f.name), bool) else value[..., 0]

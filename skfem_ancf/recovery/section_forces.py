@@ -3,8 +3,6 @@ element does no work in a rigid motion. With the loads on the element it is ther
 equilibrium, whatever the error of the displacement. Equilibrium of the part of the element between
 a node and a section gives the section force and moment."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from inspect import ismethod

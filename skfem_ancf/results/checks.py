@@ -1,7 +1,5 @@
 """Checks of a state against the range of the law and the resolution of the mesh."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import atan, sqrt
 from typing import Any

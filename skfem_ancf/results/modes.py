@@ -1,7 +1,5 @@
 """Natural frequencies and modes, linear buckling loads, frequency responses."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

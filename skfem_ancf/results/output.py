@@ -1,7 +1,5 @@
 """What solutions show: pages of HTML, extremes of fields, files, pictures."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io

@@ -1,7 +1,5 @@
 """States: positions, strains, stresses, energies, reactions of a configuration."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -196,7 +194,7 @@ class State(Immutable, MaterialPoints, Output):
     multipliers: Array
     doubt: str
     memory: Array | None
-    base: State | None
+    base: "State | None"
     _force: Array | None
     _inertia: Array | float
     _motion: Any
@@ -210,7 +208,7 @@ class State(Immutable, MaterialPoints, Output):
                  t: float | None = None, inertia: Array | float = 0.0,
                  acceleration: Array | None = None, motion: Any = None, origin: Any = None,
                  verdict: Verdict | None = None, doubt: str = "",
-                 memory: Array | None = None, base: State | None = None,
+                 memory: Array | None = None, base: "State | None" = None,
                  seen: int = UNSEEN) -> None:
         m = system.constraints.m
         multipliers = np.zeros(m) if multipliers is None else multipliers
@@ -223,7 +221,7 @@ class State(Immutable, MaterialPoints, Output):
             acceleration=acceleration, doubt=doubt, memory=memory, base=base, _force=force,
             _inertia=inertia, _verdict=verdict, _motion=motion, _origin=origin, _seen=seen)
 
-    def replace(self, **changes: Any) -> State:
+    def replace(self, **changes: Any) -> "State":
         """A copy with changed attributes, as ``replace(message="guess")``. ``error_estimate``,
         ``scene`` and ``refinements`` are those of an adaptive solution. Raises NameUnknown if an
         attribute is not known."""

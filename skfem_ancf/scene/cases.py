@@ -1,7 +1,5 @@
 """Load cases, combinations with factors, and envelopes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from typing import Any, NamedTuple

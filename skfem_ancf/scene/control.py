@@ -1,7 +1,5 @@
 """For controllers: linear models about a state, and motions one step at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
@@ -224,7 +222,7 @@ class Factors(NamedTuple):
     keep: Array
 
     @classmethod
-    def of(cls, rows: Any, left: Array, right: Array, keep: Array) -> Factors:
+    def of(cls, rows: Any, left: Array, right: Array, keep: Array) -> "Factors":
         """Those of a matrix of blocks, scaled from both sides."""
         A = sparse.diags_array(left) @ sparse.block_array(rows, format="csr") @ (
             sparse.diags_array(right))
@@ -402,7 +400,7 @@ class Stepper:
         self._sensors = [(name, sensor, locate(sensor, s))
                          for name, sensor in self.scene.sensors.items()]
 
-    def reset(self) -> Stepper:
+    def reset(self) -> "Stepper":
         """Go back to the start."""
         motion = None if self._given[0] is None else self._given[0]._motion
         self._begun, self._n = 0.0 if motion is None else motion.t, 0
@@ -422,7 +420,7 @@ class Stepper:
         y.turns = self._turns.begin(u) if motion is None else motion.turns
         return y
 
-    def copy(self) -> Stepper:
+    def copy(self) -> "Stepper":
         """A stepper that continues from here by itself."""
         return copy(self)
 
@@ -470,7 +468,7 @@ class Stepper:
         return {name: read_steps(sensor, at, [self._y])[0] if sensor.moving else
                 read(sensor, at, state) for name, sensor, at in self._sensors}
 
-    def step(self, inputs: ArrayLike = ()) -> Stepper:
+    def step(self, inputs: ArrayLike = ()) -> "Stepper":
         """Take a step.
 
         Raises ConvergenceError if the step fails, halved steps too; the stepper stays where it was.

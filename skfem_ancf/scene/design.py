@@ -1,8 +1,6 @@
 """Readings of static solutions as functions of parameters, with derivatives by the adjoint; among
 them frequencies, buckling loads and critical loads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple

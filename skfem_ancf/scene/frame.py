@@ -1,7 +1,5 @@
 """Frames: lines between nodes with rigid or hinged connections."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -148,7 +146,7 @@ class Frame(Scene):
                    width: float | Callable[..., ArrayLike] | None = None,
                    section: Section | None = None, element: ElementBeam = CABLE,
                    formulation: str | Formulation | type[Formulation] = "assumed",
-                   damping: KelvinVoigt | None = None, compiled: bool = True) -> Frame:
+                   damping: KelvinVoigt | None = None, compiled: bool = True) -> "Frame":
         """A frame of lines between points.
 
         Parameters
@@ -219,7 +217,7 @@ class Frame(Scene):
                     section: Section | None = None, element: ElementBeam = CABLE,
                     formulation: str | Formulation | type[Formulation] = "assumed",
                     damping: KelvinVoigt | None = None, compiled: bool = True,
-                    unit: str | None = None) -> Frame:
+                    unit: str | None = None) -> "Frame":
         """A frame of the line cells of a mesh: Gmsh's ``.msh``, ``.vtu``, and others.
 
         Parameters
@@ -324,7 +322,7 @@ class Frame(Scene):
 
     # supports
 
-    def hold(self, place: Any, *what: str | Sequence[str]) -> Frame:
+    def hold(self, place: Any, *what: str | Sequence[str]) -> "Frame":
         """Fix the displacement of nodes along x or y, or their rotation.
 
         Parameters
@@ -350,7 +348,7 @@ class Frame(Scene):
 
     def settle(self, place: Any, x: float | Callable[[float], float] | None = None,
                y: float | Callable[[float], float] | None = None,
-               angle: float | Callable[[float], float] | None = None) -> Frame:
+               angle: float | Callable[[float], float] | None = None) -> "Frame":
         """Prescribe the displacement of nodes along x or y, or their rotation.
 
         Parameters
@@ -387,7 +385,7 @@ class Frame(Scene):
         loose = nodes[~self._nodes.rigid[nodes]]
         refuse(len(loose), "all lines are hinged at node {[0]}: {}", loose, advice)
 
-    def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
+    def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> "Frame":
         """Fix positions and rotations of nodes, see :meth:`nodes`; hinged lines stay hinged. The
         rotation is that of the best-fit line of a section, which may warp and change its thickness.
         ``beam`` is None and ``thickness`` "free" for a frame."""
@@ -395,7 +393,7 @@ class Frame(Scene):
         require_option("thickness at the nodes of a frame", thickness, ("free",))
         return self._hold(boundary, COMPONENTS)
 
-    def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
+    def pin(self, boundary: Any, beam: WhichBeam = None) -> "Frame":
         """Fix the positions of nodes, see :meth:`nodes`; ``beam`` is None for a frame."""
         _no_beam(beam)
         return self._hold(boundary, ("x", "y"))
@@ -403,7 +401,7 @@ class Frame(Scene):
     # loads
 
     def point_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
-                    amplitude: TimeFunction = None) -> Frame:
+                    amplitude: TimeFunction = None) -> "Frame":
         """A dead force on each of some nodes, see :meth:`nodes`, or on a material point. A point
         (x, y) may lie between nodes, with or without ``beam``; or ``at`` is a function of time that
         returns such points, with ``beam``."""
@@ -420,7 +418,7 @@ class Frame(Scene):
         return self
 
     def moment(self, boundary: Any, M: float, beam: WhichMember = None,
-               amplitude: TimeFunction = None) -> Frame:
+               amplitude: TimeFunction = None) -> "Frame":
         """A moment on nodes, see :meth:`nodes`, each with a rigid line; ``beam`` is None."""
         _no_beam(beam)
         M = require_finite_scalar("M", M)
@@ -431,7 +429,7 @@ class Frame(Scene):
         return self
 
     def follower_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
-                       amplitude: TimeFunction = None, line: int | None = None) -> Frame:
+                       amplitude: TimeFunction = None, line: int | None = None) -> "Frame":
         """A force that rotates with a line: a :class:`~skfem_ancf.FollowerForce`. ``line`` is the
         number of the line whose tangent is used, where several meet."""
         points = self.system.points
@@ -443,7 +441,7 @@ class Frame(Scene):
         return super().follower_force(force, at, beam, amplitude, line)
 
     def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
-                  amplitude: TimeFunction = None) -> Frame:
+                  amplitude: TimeFunction = None) -> "Frame":
         """A dead force per length of the axis of lines. ``beam`` may also be the name of a set of
         lines of the mesh."""
         known = [b.name for b in self.beams]

@@ -1,7 +1,5 @@
 """The description of a scene: beams, rigid bodies and items, and methods that add items."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from copy import copy
@@ -184,7 +182,7 @@ class Model(NearMisses):
             self._entries, self._fixed, self._system = self._entries + tuple(entries), fixed, None
         return bound
 
-    def add(self, item: Item) -> Self:
+    def add(self, item: Item) -> "Self":
         """Add a load, a support, a joint, a force element, or a user-defined item.
 
         Parameters
@@ -207,7 +205,7 @@ class Model(NearMisses):
         self._put(item)
         return self
 
-    def units(self, force: str, length: str) -> Self:
+    def units(self, force: str, length: str) -> "Self":
         """Set the units of the scene for pictures, files and tables.
 
         Numbers do not change: use consistent units, as N, mm, MPa and tonnes.
@@ -362,7 +360,7 @@ class Model(NearMisses):
         """
         return self._put(Motor(at, angle, speed, torque, other))[0]
 
-    def damping(self, mass: float = 0.0, stiffness: float = 0.0, modal: ArrayLike = ()) -> Self:
+    def damping(self, mass: float = 0.0, stiffness: float = 0.0, modal: ArrayLike = ()) -> "Self":
         """Rayleigh and modal damping of the whole scene, which replaces an earlier one.
 
         A mode of the angular frequency omega has the damping ratio ``mass / (2 omega) + stiffness

@@ -1,7 +1,5 @@
 """Readings of motions as functions of parameters, with derivatives forward or by the adjoint."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Parameters of a scene by object and name, and gradients of its states by them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce

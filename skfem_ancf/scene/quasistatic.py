@@ -1,7 +1,5 @@
 """Quasi-static runs: loads, supports and obstacles as functions of time, without inertia."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Sequence
 from functools import partial

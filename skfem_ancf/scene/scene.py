@@ -1,7 +1,5 @@
 """Scenes: beams, actions on them, and their solutions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import partial
@@ -195,7 +193,7 @@ class Scene(Model):
         return scene
 
     def replace(self, beam: WhichBeam = None, loads: Sequence[Load] | None = None,
-                beams: Sequence[Beam] | None = None, **changes: Any) -> Self:
+                beams: Sequence[Beam] | None = None, **changes: Any) -> "Self":
         """The scene with other loads, on other beams, or with changed arguments of one beam.
 
         On an unchanged mesh a state of the old scene is a good ``solve_static(start=state)``.
@@ -355,7 +353,7 @@ class Scene(Model):
 
     plot = plot_scene
 
-    def explore(self, load: PointForce | Callable[[float], Item | Scene],
+    def explore(self, load: "PointForce | Callable[[float], Item | Scene]",
                 interval: ArrayLike = (0.0, 1.0), value: float | None = None, *, title: str = "",
                 field: Any = None, limits: ArrayLike | None = None,
                 thickness: float | str = "auto", off_screen: bool | None = None,
@@ -558,7 +556,7 @@ class Scene(Model):
         return self.linearize(about, inputs, outputs).frequency_response(frequencies, modes)
 
     def initial_velocity(self, v: ArrayLike | Callable[[Array], Array],
-                         beam: WhichMember = None) -> Self:
+                         beam: WhichMember = None) -> "Self":
         """The velocity at the start of :meth:`integrate`.
 
         Components that violate supports and joints are removed by impulses.
@@ -734,7 +732,7 @@ class Scene(Model):
                        progress=progress)
 
     def sensor(self, name: str, what: str | Callable[[State], Any], at: Any = None,
-               beam: WhichBeam = None, recover: bool = False, line: int | None = None) -> Self:
+               beam: WhichBeam = None, recover: bool = False, line: int | None = None) -> "Self":
         """Record a quantity at every step of motions: ``history.sensors[name]``.
 
         States may then be stored sparsely, by ``integrate(..., t_eval=...)``.

@@ -1,7 +1,5 @@
 """States for the equations of a scene, static and adaptive solutions, and plans of solutions."""
 
-from __future__ import annotations
-
 import logging
 from collections import Counter
 from collections.abc import Callable

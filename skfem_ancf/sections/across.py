@@ -1,7 +1,5 @@
 """The section of one beam on its mesh: weights, stiffnesses, shear, inertias, jumps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial, reduce
@@ -143,10 +141,10 @@ TIMES = {"stiffness": "grade", "E": "grade", "mass": "density", "area": ""}
 class LayerPoints:
     """Points of a layer, from :meth:`Across.at`."""
 
-    def __init__(self, across: Across, layer: Layer, X: Array, tind: Array | None = None) -> None:
+    def __init__(self, across: "Across", layer: Layer, X: Array, tind: Array | None = None) -> None:
         self.across, self.layer, self.X, self.tind = across, layer, X, tind
 
-    def moved(self, X: Array) -> LayerPoints:
+    def moved(self, X: Array) -> "LayerPoints":
         """The same layer at other points, (2, npoints) or (2, nelements, npoints)."""
         return LayerPoints(self.across, self.layer, X, self.tind)
 

@@ -3,8 +3,6 @@ millimetres are those of EN 10365 (IPE, HEA, HEB, UPN), EN 10056-1 (equal angles
 (T). Radii of hollow sections are those of EN 10210-2 (hot finished) and EN 10219-2 (cold formed),
 which set them for the calculation of properties."""
 
-from __future__ import annotations
-
 import re
 from functools import lru_cache, partial
 from itertools import pairwise

@@ -2,8 +2,6 @@
 list of layers from bottom to top, each with a material, a width, and a measure b(Y) dY, fixed or
 moving, whose Gauss rules integrate across it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -59,11 +57,11 @@ class Measure(Immutable):
         """Points eta (m,) and weights (m,) of sum 1, exact to degree 2 n - 1."""
         raise NotImplementedError
 
-    def of_order(self, order: int) -> Measure:
+    def of_order(self, order: int) -> "Measure":
         """The measure for elements of order N, whose strain energy has degree 4 N across."""
         return self
 
-    def at(self, height: float) -> Measure:
+    def at(self, height: float) -> "Measure":
         return self
 
     @property
@@ -183,7 +181,7 @@ class Moving(Measure):
         self.pieces, self.mean = largest.pieces, largest.mean
         self.spent = 2 * ((degree + 1) // 2)
 
-    def of_order(self, order: int) -> Moving:
+    def of_order(self, order: int) -> "Moving":
         return Moving(self.pieces_of, self.height, max(LEAST, 4 * order))
 
     def at(self, height: float) -> Weighted:
@@ -330,7 +328,7 @@ class Section(Immutable):
     has_fields = True
 
     @staticmethod
-    def profile(name: str, scaled: bool = False, unit: str = "m", **sizes: float) -> Section:
+    def profile(name: str, scaled: bool = False, unit: str = "m", **sizes: float) -> "Section":
         """A profile of one material: by its standard name, or by sizes with the mesh's height.
 
         Standard profiles have their root radii and tapers, and a ``height``, for the mesh: "IPE
@@ -378,7 +376,7 @@ class Section(Immutable):
         return Profile(name, scaled, **sizes)
 
     @staticmethod
-    def layers(*layers: Any, width: float | Callable[..., Any] | None = None) -> Section:
+    def layers(*layers: Any, width: float | Callable[..., Any] | None = None) -> "Section":
         """Bonded layers from bottom to top, whose total thickness is the height of the mesh.
 
         Strains are continuous. Each layer has the stress of its material. Raises InputError if a
@@ -408,7 +406,7 @@ class Section(Immutable):
 
     @staticmethod
     def numbers(EA: float, EI: float, GA: float | None = None, rhoA: float | None = None,
-                rhoI: float | None = None, width: float = 1.0) -> Section:
+                rhoI: float | None = None, width: float = 1.0) -> "Section":
         """A section given by stiffnesses and inertias about the axis: the beam of Reissner.
 
         Sections stay plane and keep their size. So an element with sections of a higher order is

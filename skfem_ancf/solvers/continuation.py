@@ -1,7 +1,5 @@
 """Arc-length continuation past limit, snap-back and bifurcation points."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace

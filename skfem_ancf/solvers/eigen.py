@@ -1,7 +1,5 @@
 """Natural frequencies about a state, and linear buckling loads."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg
 from scipy import sparse

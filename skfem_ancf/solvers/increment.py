@@ -1,7 +1,5 @@
 """One load increment."""
 
-from __future__ import annotations
-
 import logging
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The equilibrium iteration, Newton's method and the mixed iteration; results and failures."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Annotated, NamedTuple
 

@@ -1,7 +1,5 @@
 """Static equilibrium: strategies, and load steps."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import replace

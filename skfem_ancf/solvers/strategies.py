@@ -12,8 +12,6 @@ An obstacle of default stiffness is stiffened until the penetration is small and
 energy.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

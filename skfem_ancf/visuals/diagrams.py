@@ -1,7 +1,5 @@
 """Diagrams of normal force, shear force and bending moment."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

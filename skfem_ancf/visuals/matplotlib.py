@@ -1,7 +1,5 @@
 """Plots of the deformed body, coloured by a field; films of a motion, by Pillow and imageio."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any

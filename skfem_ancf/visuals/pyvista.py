@@ -1,7 +1,5 @@
 """States and motions as pyvista grids with all fields, views of them, and an interactive one."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

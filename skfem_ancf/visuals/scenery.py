@@ -1,7 +1,5 @@
 """What pictures show: bodies of one or more instants on a grid, their colours; symbols of items."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from functools import cached_property

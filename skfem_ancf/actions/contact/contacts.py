@@ -1,7 +1,5 @@
 """The obstacles of a scene: tables for kernels, and history data of steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
@@ -196,7 +194,7 @@ class Contacts:
         finally:
             memory[ANCHORED], self.softness[0] = before
 
-    def after(self, memory: Array) -> Contacts:
+    def after(self, memory: Array) -> "Contacts":
         """A copy with other history data (n,)."""
         _ = self.sweep if self.obstacles else None  # one, whatever the history
         other = copy(self)

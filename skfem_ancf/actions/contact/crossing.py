@@ -3,8 +3,6 @@ more than the path length. A point with path length w and gaps g_0 and g_1 at th
 deeper than ``(w - g_0 - g_1) / 2``, which excludes most points. The others have crossed the
 obstacle if they are deeper on the path than at both ends, and on another side at its end."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Tables of contact with obstacles. A pair is the surface of one beam with one obstacle.
 Poses of obstacles."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeAlias
 
 import numpy as np

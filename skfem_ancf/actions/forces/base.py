@@ -1,7 +1,5 @@
 """Base class of force elements: forces on points and sections, and their derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any, NamedTuple

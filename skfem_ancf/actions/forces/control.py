@@ -1,7 +1,5 @@
 """Forces and moments as functions of time and measurements: controllers, motors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 

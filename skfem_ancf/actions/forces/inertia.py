@@ -1,7 +1,5 @@
 """Point masses, and a frame of reference that rotates with its centrifugal and Coriolis forces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -135,7 +133,7 @@ class RotatingFrame(ForceElement):
         c, d = np.divmod(np.arange(4), 2)
         self.entries = ((2 * i[:, None] + c).ravel(), (2 * j[:, None] + d).ravel())
 
-    def with_masses(self, masses: Sequence[Any], N: int) -> RotatingFrame:
+    def with_masses(self, masses: Sequence[Any], N: int) -> "RotatingFrame":
         """A copy of the bound frame that acts on point masses, too.
 
         Parameters

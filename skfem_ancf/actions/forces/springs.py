@@ -1,7 +1,5 @@
 """Springs and dashpots, linear or not, foundations and drag."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, cast
 

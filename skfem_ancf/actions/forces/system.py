@@ -1,7 +1,5 @@
 """The force elements of a scene: tables of known kinds, and user-defined elements."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from copy import copy
 from typing import Any
@@ -182,7 +180,7 @@ class Forces:
         a, b = at.reshape(2, -1)
         self._border, self.border_rows = (len(rows) * a + b, number[out]), B[rows].toarray()
 
-    def after(self, memory: Array, pasts: Sequence[tuple[Array, Array]]) -> Forces:
+    def after(self, memory: Array, pasts: Sequence[tuple[Array, Array]]) -> "Forces":
         """A copy with a history of obstacles and springs, and pasts of items, which it uses."""
         other, new = copy(self), [one.after(*past) for one, past in zip(self.remembering, pasts)]
         of = dict(zip(map(id, self.remembering), new))
@@ -315,7 +313,7 @@ class Forces:
         idle = self._at_rest(*displacements)
         return [item for item in self.remembering if not (idle and item.changing)]
 
-    def take_over(self, other: Forces, u: Array, t: float) -> bool:
+    def take_over(self, other: "Forces", u: Array, t: float) -> bool:
         """Set the history to that of equal parts of another scene at u, t; True if there are any.
         """
         items = [*matched(self.remembering, other.remembering, lambda a, b: a.same(b), is_like)]

@@ -1,7 +1,5 @@
 """Joints: constraints with Lagrange multipliers. A new joint is one file and one line here."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ...core import require_option

@@ -1,7 +1,5 @@
 """Base class of joints: constraint equations on points and sections; parts of joints."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The nodes of a frame: connections between the ends of its lines, and settlements."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any
@@ -32,7 +30,7 @@ class Settlements:
         self.numbers, self.of = numbers, of or {}
         self.functions = tuple(self.of.values())
 
-    def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> Settlements:
+    def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> "Settlements":
         """A copy with nodes displaced by a number or a function of time."""
         numbers, of = self.numbers.copy(), dict(self.of)
         numbers[nodes, k] = 0.0 if callable(by) else by

@@ -1,7 +1,5 @@
 """Sliders: a point on a line, a circle, the axis of a beam, or a line of a rigid body."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from math import factorial, floor
 from typing import Any, NamedTuple
@@ -202,7 +200,7 @@ class AffineVector(NamedTuple):
     quotient: Array  # derivative of the divided difference, (2, n)
     slopes: Array  # the divided difference at both displacements, (2, 2)
 
-    def times(self, Q: Array) -> AffineVector:
+    def times(self, Q: Array) -> "AffineVector":
         """Q times the vector, Q of shape (2, 2)."""
         return AffineVector(Q @ self.rows, self.values @ Q.T, Q @ self.quotient, self.slopes @ Q.T)
 

@@ -1,7 +1,5 @@
 """Joints of points and sections: hinge, weld, glue, prescribed motions, plane sections, motors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 

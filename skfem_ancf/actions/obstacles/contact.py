@@ -1,7 +1,5 @@
 """Contact points, forces and pressures of a state."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

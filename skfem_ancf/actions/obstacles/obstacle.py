@@ -1,7 +1,5 @@
 """Obstacles: a shape, its motion and its contact law."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shapes of obstacles, defined by signed distances, and their outlines for pictures and files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -138,7 +136,7 @@ class Shape(Immutable):
         """Its surface as straight segments: points (2, n), and both ends of each, (m, 2)."""
         raise NotImplementedError
 
-    def fitted(self, x: Array, scale: float) -> Shape:
+    def fitted(self, x: Array, scale: float) -> "Shape":
         """The shape for a body; CallbackError if its functions are not valid."""
         return self
 
@@ -431,7 +429,7 @@ class SignedDistance(Shape):
             out[3:] = by_x[0], 0.5 * (by_x[1] + by_y[0]), by_y[1]
         return out
 
-    def fitted(self, x: Array, scale: float) -> SignedDistance:
+    def fitted(self, x: Array, scale: float) -> "SignedDistance":
         made = self._thawed()
         made._scale, made._by_steps = scale, False
         rough = made._differences(x, 0.0)

@@ -1,7 +1,5 @@
 """Contact of members of a scene with each other."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ sum(weights(zeta) * z[dofs])``, where z are the displacements of pairs of degree
 outer normal is ``side * 1j * c' / |c'|``, and the surface is at ``offset`` along it: half the
 height for a cable, whose curve is its axis, else 0."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

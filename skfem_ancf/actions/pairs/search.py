@@ -1,7 +1,5 @@
 """The broad search: which points may touch which facets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from math import perm
@@ -117,7 +115,7 @@ class Search:
         self.fresh(False)
         self.search(np.zeros(n, complex))
 
-    def fresh(self, other: bool = True) -> Search:
+    def fresh(self, other: bool = True) -> "Search":
         """Search anew, or make a copy that does so."""
         one, t, n = copy(self) if other else self, self.tables, len(self.tables.seen)
         one.tables = t._replace(

@@ -1,8 +1,6 @@
 """Beams that may touch themselves, cut into stretches that cannot, see
 :mod:`skfem_ancf.actions.contact.stretches`."""
 
-from __future__ import annotations
-
 from math import comb
 from typing import Any
 

@@ -12,8 +12,6 @@ arcs), or each element has its own G (other curved meshes, tapers) and R and D a
 The tangent is a product of constant matrices with few coefficients, those of products of two rows.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

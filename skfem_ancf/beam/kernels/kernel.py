@@ -1,7 +1,5 @@
 """Kernels of one beam, and elements of laws with a history."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from typing import Any, NamedTuple
@@ -64,7 +62,7 @@ class ElementKernel:
         """True if all moduli are constant."""
         return all(t.law.kind == LINEAR for t in self.tables)
 
-    def remembering(self, past: Past) -> ElementKernel:
+    def remembering(self, past: "Past") -> "ElementKernel":
         """The kernel with a history of its laws, of which it has views."""
         other = copy(self)
         vars(other).update(elements=remembering(self.elements, past),
@@ -333,7 +331,7 @@ class ElementsWithHistory(Elements):
         self.history, self.before = np.split(history.reshape(shape), [n])
         self.now, self.span = now.reshape(shape)[n:], span
 
-    def remembering(self, history: Array, span: Array, now: Array) -> ElementsWithHistory:
+    def remembering(self, history: Array, span: Array, now: Array) -> "ElementsWithHistory":
         """A copy with another history, time span and eigenstrains at the end, see :class:`Past`."""
         for name in CONSTANT:  # made once for all copies
             getattr(self, name)
@@ -341,7 +339,7 @@ class ElementsWithHistory(Elements):
         other._own(history, span, now)
         return other
 
-    def elastic_from(self, u: Array) -> ElementsWithHistory:
+    def elastic_from(self, u: Array) -> "ElementsWithHistory":
         """A copy that is elastic from its stress at u: no yielding, no relaxation."""
         other, E = copy(self), self.strain_at(u)
         D = np.atleast_2d(self.material.axial_modulus) if self._fibres else self.t.law.D

@@ -8,8 +8,6 @@ sampled at 2 m - 2 Gauss points for an axis of degree 2 m - 1. Those of the cubi
 (equal axial slopes at both nodes), which gets a third point in the middle with a weight that
 decreases with the slenderness. Rows are d/dX and d^2/dX^2 at each point."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -34,7 +32,7 @@ class Integral(NamedTuple):
 
     layer: Layer
     term: Term
-    samples: Samples
+    samples: "Samples"
     volumes: Array  # of the integration points, (1 or ne, points)
     first: bool  # the first term of its layer
 

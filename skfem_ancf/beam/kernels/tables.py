@@ -15,8 +15,6 @@ component i of function k and component j of function l. Few operations give the
 rest is a matrix product.
 """
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Sequence
 from functools import lru_cache
@@ -91,7 +89,7 @@ class StrainTables(NamedTuple):
     frame: F3  # rows x in the reference configuration, (k, rows, 2)
     H: F2  # weighted moduli: T[s] = sum H[s, t] strain[t], (k, nq); at zero strain if nonlinear
     C: F3  # constant stiffness, (k, 2 nb - 2, 2 nb - 2), or (0, ...)
-    law: LawTables
+    law: "LawTables"
     along: F2  # for nonlinear laws: from samples to integration points, (3 points, ns)
     weights: F2  # for nonlinear laws: weights of the points, (k, points)
     reach: F2  # for fibres: factors of the samples before ``along``, (k, ns); (k, 0) if all are 1
