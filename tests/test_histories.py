@@ -752,6 +752,12 @@ def test_what_cannot_be_is_said():
     for shares, times, text in (([0.6, 0.5], [1.0, 2.0], "below 1"), ([0.5], [-1.0], "times")):
         with pytest.raises(InputError, match=text):
             Prony(StVenantKirchhoff(E, NU), shares, times)
+    for call, text in ((lambda: ElasticPlastic(E, NU), r"\(E, nu, yield_stress, ...\): .*'yield_s"),
+                       (lambda: Voce(1e8), r"Voce\(saturation, rate, ...\): missing .*'rate'"),
+                       (lambda: Voce(1e8, -20.0), "rate must be zero or positive, got -20"),
+                       (lambda: Prony(steel, [0.5], [1.0], 2, 3), "too many positional")):
+        with pytest.raises(InputError, match=text):
+            call()
     with pytest.raises(InputError, match=r"table \(n, 2\) or Voce\(saturation, rate\), got 'voce'"):
         ElasticPlastic(E, NU, YIELD, hardening="voce")
     with pytest.raises(InputError, match="must be elastic"):
@@ -776,9 +782,59 @@ def test_wrong_derivatives_and_shapes_of_a_law_are_said():
         def stress(self, strain, history, dt):
             return strain[:2], history
 
-    for law, text in ((Wrong, "is not the derivative"), (Short, "shapes")):
-        with pytest.raises(InputError, match=text):
+    class Alone(Short):
+        def stress(self, strain, history, dt):
+            return np.tensordot(self.elastic, strain, 1)
+
+    class Fewer(Short):
+        def stress(self, strain):
+            return strain, ()
+
+    class Listed(Short):
+        variables = ["flow"]  # noqa: RUF012
+
+    class InPlace(Short):
+        variables = {"flow": 3}  # noqa: RUF012
+
+        def stress(self, strain, history, dt):
+            history[:] = 0.5 * strain
+            return np.tensordot(self.elastic, strain - history, 1), history
+
+    class Moves(InPlace):
+        def stress(self, strain, history, dt):
+            return np.tensordot(self.elastic, strain - history, 1), 0.5 * (strain + history)
+
+    class Infinite(InPlace):
+        def stress(self, strain, history, dt):
+            return strain / (strain[0] - strain[0]).real, history
+
+    for law, text in ((Wrong, "is not the derivative"), (Short, "shapes"), (Alone, "return a pair"),
+                      (Fewer, "raised TypeError"), (Listed, r"as {.damage.: 1}, got \['flow'\]"),
+                      (InPlace, "changes the history that it is given: return a new array"),
+                      (Moves, "the same stress again, in a further increment of dt = 0"),
+                      (Infinite, "finite numbers")):
+        with pytest.raises(InputError, match=text), np.errstate(all="ignore"):
             _ = Beam(line, ElementBeamANCF(2), law(E, NU), width=B).kernel
+
+
+def test_fields_that_a_law_does_not_give_are_not_zero():
+    state = stretched_by(Damage(E, 0.0))
+    assert state.field(lambda v: v.output("largest"), (0.5, 0.0)) > 0.0
+    for name in ("plastic_strain", "dissipated", "back_stress"):
+        with pytest.raises(InputError, match=rf"{name}.*no value.*outputs\(strain, history"):
+            state.field(name, (0.5, 0.0))
+    assert np.isnan(state.field(lambda v: v.output("larger"), (0.5, 0.0)))
+    assert np.isnan(state.field(lambda v: v.variable("larger"), (0.5, 0.0)))
+    relaxed = stretched_by(Prony(StVenantKirchhoff(E, 0.0), [0.5], [1.0]))
+    assert relaxed.field("plastic_strain", (0.5, 0.0)) == 0.0
+    with pytest.raises(InputError, match="dissipated.*no value"):
+        relaxed.field("dissipated", (0.5, 0.0))
+
+
+def stretched_by(law):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), height=H), ElementBeamCable(3), law,
+                width=B)
+    return Scene(beam).clamp("left").point_force((E * B * H * 1e-4, 0), at="right").solve_static()
 
 
 # temperature, eigenstrains, tapers

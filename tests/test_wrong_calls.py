@@ -115,6 +115,9 @@ WRONG = [
     (lambda: clamped().run(1.0, min_step=2), "min_step must be at most 1.*got 2"),
     (lambda: Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5), MATERIAL),
      "give width=, that of a rectangle, or section="),
+    # missing arguments
+    (lambda: clamped().point_force((0, -1)), r"PointForce\(force, at, ...\): missing .*'at'"),
+    (lambda: clamped().drag(), r"Drag\(density, normal, ...\): missing .*'density'"),
     # the order of arguments
     (lambda: clamped().load(LinearForm(lambda v, w: v[1]), BilinearForm(lambda u, v, w: 0.0)),
      "second argument of a load is the boundary.*tangent="),

@@ -84,13 +84,19 @@ class _Freezing(type):
         try:
             made = super().__call__(*args, **kwargs)
         except TypeError:
-            arguments = cls.__signature__.parameters.values()
-            if any(a.kind == a.VAR_KEYWORD for a in arguments):
-                raise
-            try:
-                require_options(cls.__name__, kwargs, [a.name for a in arguments])
-            except CallError as better:  # Python's error does not name the arguments
+            call = cls.__signature__
+            arguments = call.parameters.values()
+            known = [*kwargs] * any(a.kind == a.VAR_KEYWORD for a in arguments)
+            try:  # Python's error does not name the arguments
+                require_options(cls.__name__, kwargs, known + [a.name for a in arguments])
+                call.bind(*args, **kwargs)
+            except CallError as better:
                 raise better from None
+            except TypeError as why:
+                needed = [a.name for a in arguments if a.default is a.empty and a.kind not in (
+                    a.VAR_KEYWORD, a.VAR_POSITIONAL)]
+                more = ["..."] * (len(needed) < len(arguments))
+                raise CallError(f"{cls.__name__}({', '.join(needed + more)}): {why}") from None
             raise
         made._freeze()
         return made

@@ -1,10 +1,11 @@
 """Von Mises plasticity with isotropic and kinematic hardening."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core import (Array, ArrayLike, refuse, require_finite, require_not_negative,
+from ..core import (Array, ArrayLike, Immutable, refuse, require_finite, require_not_negative,
                     require_positive)
 from .history import ACROSS, HistoryMaterial
 from .library import values_of
@@ -23,7 +24,7 @@ FUNCTIONS = {"stress": (plane_stress, plane_stress_energy, fibre, fibre_energy),
 VARIABLES = {"plastic_strain": 3, "back_stress": 3, "accumulated": 1}
 
 
-class Voce(NamedTuple):
+class Voce(Immutable):
     """Isotropic hardening that saturates: ``saturation (1 - exp(-rate p)) + linear p``.
 
     p is the accumulated plastic strain; it is added to the yield stress.
@@ -36,9 +37,16 @@ class Voce(NamedTuple):
     [250000000.0, 350000000.0]
     """
 
-    saturation: float
-    rate: float
-    linear: float = 0.0
+    def __init__(self, saturation: float, rate: float, linear: float = 0.0) -> None:
+        self.saturation = require_not_negative("saturation", saturation, False)
+        self.rate = require_not_negative("rate", rate, False)
+        self.linear = require_not_negative("linear", linear, False)
+
+    def __iter__(self) -> Iterator[float]:
+        return iter((self.saturation, self.rate, self.linear))
+
+    def __repr__(self) -> str:
+        return "Voce({:g}, {:g}, {:g})".format(*self)
 
 
 def _by_plane(k: int) -> Any:
@@ -106,7 +114,7 @@ class ElasticPlastic(HistoryMaterial):
                          strength)
         refuse(self.nu == 0.5, "ElasticPlastic needs nu below 0.5, got 0.5: use 0.49")
         self.yield_stress = require_positive("yield_stress", yield_stress)
-        self.kinematic = require_not_negative("kinematic", kinematic)
+        self.kinematic = require_not_negative("kinematic", kinematic, False)
         self.hardening = self._checked(hardening)
 
     @classmethod
@@ -124,8 +132,6 @@ class ElasticPlastic(HistoryMaterial):
 
     def _checked(self, hardening):
         if isinstance(hardening, Voce):
-            for name, value in zip(hardening._fields, hardening):
-                require_not_negative(f"{name} of hardening", value)
             return hardening
         refuse(isinstance(hardening, str), "hardening is a number, a table (n, 2) or "
                "Voce(saturation, rate), got {!r}", hardening)

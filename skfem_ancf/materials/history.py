@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import (Array, ConvergenceError, InputError, Law, rebuilt, refuse, require_integer,
+from ..core import (Array, ConvergenceError, InputError, Law, ask, rebuilt, refuse, require_integer,
                     require_positive, require_slope)
 from .base import LinearLaw, Material, hooke
 from .pointwise import MODULI, python
@@ -274,15 +274,32 @@ class HistoryMaterial(Material):
 
     def _require_consistent(self):
         if not hasattr(self, "_consistent"):
+            kind = type(self).__name__
+            known = isinstance(self.variables, Mapping) and all(
+                isinstance(n, (int, np.integer)) and n > 0 for n in self.variables.values())
+            refuse(not known, 'variables of {} are names and numbers of components, as {{"damage": '
+                   '1}}, got {!r}', kind, self.variables)
             E, d = np.array([[1.3], [-0.7], [0.9]]), np.array([[0.3], [0.7], [-0.6]])
             E, d, zero = SMALL * E, 1e-4 * SMALL * d, np.zeros((self.number, 1))
-            S, after = self.stress(E, zero, SPAN)
+            what = f"stress(strain, history, dt) of {kind}"
+            history = zero.copy()
+            answer = ask(what, self.stress, E, history, SPAN)
+            refuse(not isinstance(answer, tuple) or len(answer) != 2, "{} must return a pair, the "
+                   "stress and the history at the end, got {!r}", what, answer)
+            S, after = answer
             refuse(np.shape(S) != E.shape or np.shape(after) != zero.shape, "stress of {} must "
-                   "return the shapes of strain and history, {} and {}, got {} and {}",
-                   type(self).__name__, E.shape, zero.shape, np.shape(S), np.shape(after))
-            D = self.moduli(E, zero, SPAN)
-            require_slope(f"moduli(strain, history, dt) of {type(self).__name__}",
-                          "stress(strain, history, dt)",
+                   "return the shapes of strain and history, {} and {}, got {} and {}", kind,
+                   E.shape, zero.shape, np.shape(S), np.shape(after))
+            refuse(np.any(history != zero), "{} changes the history that it is given: return a new "
+                   "array, which solvers take when an increment has succeeded", what)
+            refuse(not (np.isfinite(S).all() and np.isfinite(after).all()),
+                   "{} must return finite numbers, got {!r} and {!r}", what, S, after)
+            D = ask(f"moduli(strain, history, dt) of {kind}", self.moduli, E, zero, SPAN)
+            require_slope(f"moduli(strain, history, dt) of {kind}", "stress(strain, history, dt)",
                           lambda s: self.stress(E + s * d, zero, SPAN)[0],
                           np.einsum("ij...,j...->i...", D, d))
+            again = self.stress(E, np.asarray(after), 0.0)[0]
+            refuse(not np.allclose(again, S, rtol=0.0, atol=1e-6 * np.max(np.abs(S))), "{} must "
+                   "give the same stress again, in a further increment of dt = 0 from the history "
+                   "that it returned: {!r}, then {!r}", what, np.ravel(S), np.ravel(again))
             self._consistent = True

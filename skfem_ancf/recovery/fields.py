@@ -228,15 +228,16 @@ class Values(Mapping):
         name
             Its name in ``outputs`` of a :class:`~skfem_ancf.materials.HistoryMaterial`.
         other
-            Value where a material does not have it.
+            Value where materials have no history. NaN where one has a history without it.
         """
         return self._by_history(lambda law, history: law.outputs(
             self.elastic, history,
             stretched(self.strain[0])[0] * self.S if self.cable else self.S,
-            ).get(name, np.full(self.n, other)), other)
+            ).get(name, np.full(self.n, np.nan)), other)
 
     def variable(self, name: str, components: int = 1) -> Array:
-        """A history variable of materials, (n,) or (components, n); zero where there is none.
+        """A history variable of materials, (n,) or (components, n); zero where materials have no
+        history, NaN where one has a history without it.
 
         Parameters
         ----------
@@ -246,7 +247,7 @@ class Values(Mapping):
         """
         found = np.array([self._by_history(
             lambda law, history, k=k: history[law.rows(name)][k] if name in law.variables else
-            np.zeros(self.n), 0.0) for k in range(components)])
+            np.full(self.n, np.nan), 0.0) for k in range(components)])
         return found[0] if components == 1 else found
 
     def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
@@ -531,7 +532,9 @@ def no_value(field: Field) -> InputError:
         ": give a material its strength, as StVenantKirchhoff(..., strength=235e6)"
         if field.name == "utilisation" else
         ": stress needs sections with a shape; state.resultants() has the section forces"
-        if field.unit == "force / area" else ""))
+        if field.unit == "force / area" and field.name not in PLASTIC else
+        ": a user-defined law gives it by outputs(strain, history, stress); v.output(name) of a "
+        "function of Values has what it gives now" if field.name in PLASTIC else ""))
 
 
 def find_fields(fields: Any, beams: Sequence[Any] = ()) -> list[Field]:

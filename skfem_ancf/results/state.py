@@ -23,7 +23,7 @@ from ..equations.evaluation import UNSEEN
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
 from ..equations.system import System
-from ..recovery.fields import DomainValues, Values, find_field
+from ..recovery.fields import PLASTIC, DomainValues, Values, find_field, no_value
 from ..recovery.recovered import Recovery
 from ..recovery.resultants import ALONG_ELEMENT, Resultants, resultants
 from ..recovery.section_forces import NotRecovered, SectionForces
@@ -370,8 +370,11 @@ class State(Immutable, MaterialPoints, Output):
         300.0
         """
         found = find_field(field)
-        return self._at_points(lambda part: found.of(self.values_of(part, recover)), point, beam,
-                               recover, line)
+        out = self._at_points(lambda part: found.of(self.values_of(part, recover)), point, beam,
+                              recover, line)
+        if found.name in PLASTIC and found.name != "yield_ratio" and np.isnan(out).all():
+            raise no_value(found)  # the ratio of what does not yield is NaN
+        return out
 
     def _at_points(self, of, point, beam, recover, line):
         """What a function returns of the points of each member, in the order of the points."""
