@@ -93,6 +93,23 @@ def test_the_force_between_two_rods_has_its_impulse(element, friction, dt):
         assert history.sensors["on b"].max() == pytest.approx(0.5 * RHO * WAVE * v * H**2, rel=0.1)
 
 
+@pytest.mark.parametrize("dt", [1e-6, 5e-5], ids=["resolved", "not resolved"])
+def test_friction_between_members_has_its_impulse(dt):
+    """A block that slides while it bounces: friction is that of the step, not of its end."""
+    floor, block = (Beam(MeshBeam.init_line(np.linspace(0, size, n), height=0.01, origin=x),
+                         ElementBeamANCF(2), STEEL, width=0.01)
+                    for size, n, x in ((0.4, 9, (0, 0)), (0.1, 3, (0.15, 0.01002))))
+    scene = Scene(floor, block).contact("all", friction=0.2).clamp("left", 0).clamp("right", 0)
+    scene = scene.initial_velocity((3.0, -1.0), block).sensor("force", "contact", beam=block)
+    history = scene.integrate(1e-4, dt)
+    mass = history.state(-1).system.mass
+    gained = mass.multiply(history.v[-1] - history.v[0])[floor.N:].reshape(-1, block.nd)[:, :2]
+    assert impulse(history) == pytest.approx(gained.sum(axis=0), rel=1e-6)
+    assert gained.sum(axis=0)[0] == pytest.approx(-0.2 * gained.sum(axis=0)[1], rel=1e-3)
+    assert history.state(-1).contact(on=block).total == pytest.approx(
+        history.sensors["force"][-1], rel=1e-9, abs=1e-9)
+
+
 @pytest.mark.parametrize("method", ["penalty", "augmented"])
 def test_states_have_the_forces_of_sensors(method):
     """Of a fall flat on a floor that rises, with friction; each step is stored and is whole."""

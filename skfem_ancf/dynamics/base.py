@@ -46,8 +46,8 @@ class Motion:
     memory
         Further data of the scheme for its next step: None, or a dict of numbers and arrays.
     start
-        Displacement at the start of the last step, and its size, shape (N + 1,), if the forces of
-        contact are means over it; else None.
+        Displacement and history of items at the start of the last step, and its size, shape
+        (N + k + 1,), if the forces of contact are means over it; else None.
     parts
         The Motions at the ends of the parts of the last step, or None for a whole one.
     """

@@ -203,7 +203,9 @@ class Integrator:
         acceleration, y.multipliers = solve(force - M.multiply(y.acceleration), rate)
         y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        y.start = np.append(y.u, 0.0) if self._means else None
+        if self._means:
+            of_items = () if y.history is None else y.history[s.histories.end:]
+            y.start = np.concatenate([y.u, of_items, [0.0]])
         inertia, kinetic = M.multiply(y.acceleration), 0.5 * float(y.v @ M.multiply(y.v))
         change = dt * float(y.v @ inertia) + 0.5 * dt**2 * float(y.acceleration @ inertia)
         # at rest the energy is still zero
@@ -265,8 +267,11 @@ class Integrator:
                    *multipliers.swapaxes(0, 1), np.full(done, dt), memories[:, 0], history,
                    np.broadcast_to(turns, (done, len(turns))), np.empty((done, 0)))
         if self._means and done:
-            starts = np.concatenate([[y.u], rows[:done - 1, 0]])
-            columns = *columns[:-1], np.column_stack([starts, columns[COLUMNS.index("before")]])
+            starts = [np.concatenate([[y.u], rows[:done - 1, 0]]), np.full(done, dt)]
+            if history.size:
+                starts.insert(1, np.concatenate([[y.history], history[:done - 1]])[
+                    :, s.histories.end:])
+            columns = *columns[:-1], np.column_stack(starts)
 
         def memory(k):  # the start of a step, for the next guess
             start = np.array([y.u, y.v]) if k % done == 0 else rows[k % done - 1, :2]

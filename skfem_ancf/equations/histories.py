@@ -29,6 +29,7 @@ class Histories:
     :class:`Past`, and items with a memory; ``span`` (1,) is the time since, for laws with rates.
     ``lasting`` is 1 if steps change it, 3 if that of materials, else 0; ``dissipates`` if energy
     may be lost, ``evolve`` if a material or item has a history, ``path_dependent`` if a material.
+    Items with a memory begin at ``end``.
     """
 
     def __init__(self, forces: Forces, beams: Sequence[Beam], slices: Sequence[slice]) -> None:
@@ -40,8 +41,8 @@ class Histories:
         ends = list(accumulate([first, *sizes, *(len(item.start) for item in items)]))
         self._parts: dict[Any, slice] = {
             key: slice(a, b) for key, a, b in zip(keys, ends, ends[1:])}
-        self._end = ends[len(some)]
-        self.rest = np.concatenate([np.zeros(self._end), *(item.start for item in items)])
+        self.end = ends[len(some)]
+        self.rest = np.concatenate([np.zeros(self.end), *(item.start for item in items)])
         self.path_dependent = bool(some)
         self.evolve = bool(some) or any(item.element.evolves for item in items)
         lasting = forces.contacts.tables.lasting
@@ -53,7 +54,7 @@ class Histories:
         """Make arrays for a history, and the force elements that have it."""
         self.values, self.span = np.array(self.rest if history is None else history), np.zeros(1)
         self._now, self.of_forces = self.values.copy(), self.values[:first]
-        self.of_beams = self._past(slice(first, self._end))
+        self.of_beams = self._past(slice(first, self.end))
         self._kernels: dict[int, Any] = {}
         self.span[0] = span
         self.forces = forces

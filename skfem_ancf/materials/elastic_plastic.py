@@ -29,6 +29,13 @@ class Voce(Immutable):
 
     p is the accumulated plastic strain; it is added to the yield stress.
 
+    Parameters
+    ----------
+    saturation, linear
+        Stress, and slope of the stress; zero or positive.
+    rate
+        Zero or positive.
+
     Examples
     --------
     >>> from skfem_ancf import ElasticPlastic, Voce

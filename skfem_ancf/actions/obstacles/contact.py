@@ -80,7 +80,7 @@ def touching(state: Any) -> Contact | None:
 
 
 def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
-    forces = state._equations.forces
+    forces, start, span = _step_of(state)
     if not (forces.contacts.obstacles or forces.changing):
         raise InputError("the scene has no contact: scene.obstacle(Circle((0, -1), 0.5)) adds an "
                          "obstacle, scene.contact('all') that of its members with each other")
@@ -95,7 +95,8 @@ def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
                                                          len(forces.contacts.obstacles))]]
     else:
         known = forces.elements
-    found = [*_of_obstacles(state, known, member), *_of_bodies(state, known, member)]
+    found = [*_of_obstacles(state, start, span, known, member),
+             *_of_bodies(state, forces, start, known, member)]
     *parts, nearest = zip(*found) if found else (
         *((np.zeros(shape),) for shape in ((2, 0), (2, 0), (0,), (0,))), (np.zeros(0, bool),),
         (np.inf,))
@@ -114,22 +115,28 @@ def _number(members, which):
 
 
 def _step_of(state):
-    """Displacement at the start of the last step and its size; None and 0 for an instant."""
+    """Forces of items with their history at the start of the last step, the displacement there and
+    the size of the step; None and 0 for an instant."""
     start = None if state._motion is None else state._motion.start
-    return (None, 0.0) if start is None or start[-1] == 0.0 else (start[:-1], float(start[-1]))
+    if start is None or start[-1] == 0.0:
+        return state._equations.forces, None, 0.0
+    u, of_items, span = np.split(start, [state.system.N, len(start) - 1])
+    if not of_items.size:
+        return state._equations.forces, u, float(span[0])
+    memory = np.append(state.memory[:-of_items.size], of_items)
+    return state.system.after(memory).forces, u, float(span[0])
 
 
-def _pushes(state):
+def _pushes(state, start, span):
     contacts = state._equations.forces.contacts
     v = None if state.t is None else np.array(state.v)
-    found = contacts.obstacles and contacts.pushes(np.array(state.u), v, state._time,
-                                                   *_step_of(state))
+    found = contacts.obstacles and contacts.pushes(np.array(state.u), v, state._time, start, span)
     return contacts, zip(contacts.groups, found)
 
 
-def _of_obstacles(state, known, member):
+def _of_obstacles(state, start, span, known, member):
     """Contact points, forces, pressures, gaps, sticking and the least gap of each group."""
-    contacts, pushes = _pushes(state)
+    contacts, pushes = _pushes(state, start, span)
     for (_, group), (k, x, force, pressure, gap) in pushes:
         one, first = contacts.obstacles[k], int(group.first[0])
         if not any(one is other for other in known) or (
@@ -145,10 +152,9 @@ def _of_obstacles(state, known, member):
                float(gap.min()))
 
 
-def _of_bodies(state, known, member):
+def _of_bodies(state, forces, start, known, member):
     """The same of bodies that touch each other, on both sides."""
-    t = state._time
-    for element, found in state._equations.forces.looks(np.array(state.u), t, _step_of(state)[0]):
+    for element, found in forces.looks(np.array(state.u), state._time, start):
         if not any(element.same(other) for other in known):
             continue
         x, y, force, pressure, gap, sticks, own, other = found
@@ -160,8 +166,8 @@ def _of_bodies(state, known, member):
 
 def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, float, Array]]:
     """Forces of contact on a beam, whose DOFs are given: element, xi, and nodal force (nb, 2)."""
-    u, out, (start, _) = np.array(state.u), [], _step_of(state)
-    for (_, group), (_, _, force, _, _) in _pushes(state)[1]:
+    u, out, (forces, start, span) = np.array(state.u), [], _step_of(state)
+    for (_, group), (_, _, force, _, _) in _pushes(state, start, span)[1]:
         if not dofs.start <= group.first[0] < dofs.stop:
             continue
         m, ne, xi = group.points, group.elements - 2, _along_elements(group)
@@ -175,7 +181,7 @@ def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, floa
                 nodal -= group.offsets[k] * (F @ slope) / (slope @ slope) ** 1.5 * np.outer(
                     group.slopes[:, k], [-y, x])
             out.append((e, float(at), nodal))
-    for element, at in state._equations.forces.changing:
+    for element, at in forces.changing:
         if hasattr(element, "loads_on"):
             out += element.loads_on(beam, dofs.start, u[at].reshape(-1, 2), element.history,
                                     None if start is None else start[at].reshape(-1, 2))
