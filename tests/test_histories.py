@@ -3,6 +3,7 @@
 import copy
 import pickle
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -815,6 +816,22 @@ def test_wrong_derivatives_and_shapes_of_a_law_are_said():
                       (Infinite, "finite numbers")):
         with pytest.raises(InputError, match=text), np.errstate(all="ignore"):
             _ = Beam(line, ElementBeamANCF(2), law(E, NU), width=B).kernel
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2)], ids=name)
+def test_a_column_that_yields_before_it_buckles_is_said(element):
+    """Euler's load of a stocky column is beyond yield, that of a slender one is not."""
+    law = ElasticPlastic(E, 0.0, YIELD, 0.1 * E)
+    for length, yields in ((10 * H, True), (100 * H, False)):
+        mesh = MeshBeam.init_line(np.linspace(0, length, 9), height=H)
+        column = Scene(Beam(mesh, element, law, width=B)).pin("left").fix("right", "r^2")
+        column = column.point_force((-B * H * YIELD, 0), at="right")
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            factor = column.buckling(1).factors[0]
+        assert (factor > 1.0) == yields
+        assert ["yields before the buckling load" in str(one.message) for one in said] == (
+            [True] * yields)
 
 
 def test_fields_that_a_law_does_not_give_are_not_zero():

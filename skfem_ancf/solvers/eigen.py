@@ -5,6 +5,7 @@ import scipy.linalg
 from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
+from ..beam.kernels.kernel import ElementsWithHistory
 from ..core.band import fix
 from ..core import (NO_FACTORS, Array, ConvergenceError, InputError, ModelWarning, SupportError,
                     refuse, require_integer, retold, warn)
@@ -26,7 +27,7 @@ SAME = 1e-6  # relative distance of equal eigenvalues
 UNSTRESSED = 1e-9  # relative force of springs at rest that is round-off
 SMALL = 1e-4  # relative displacement for difference quotients of domain tangents
 ASIDE = 1e-5  # relative displacement for a test of one-sided springs
-STIFFER = 0.1  # relative change of spring stiffness that is not neglected
+STIFFER = 0.1  # relative change of stiffness, or of stress by yielding, that is not neglected
 TURNING = 1e-2  # squared ratio of angular velocity to frequency that gives a warning
 REAL = 1e-7  # relative imaginary part of a real eigenvalue
 
@@ -276,6 +277,7 @@ def buckling(system: System, k: int, state: State | None = None) -> Buckling:
     system.forces.contacts.require_free(at, "buckling()",
                                         "continuation(): it touches before it buckles")
     _require_same_springs(system, before, at)
+    _say_yielding(system, before, factors[order[0]] * du)
     if not symmetric:
         _require_no_flutter(system, tangent, Ks, factors[order[0]])
     shapes = np.zeros((len(order), system.N))
@@ -337,6 +339,21 @@ def _require_same_springs(system, before, u):
     if np.any(np.abs(here - rest) > STIFFER * np.maximum(here, rest)):
         warn("springs become stiffer or softer before buckling, but buckling() uses their "
              "stiffness without load: check state.stability of scene.solve_static()", ModelWarning)
+
+
+def _say_yielding(system, before, du):
+    """Warn of materials with a history that are not elastic up to the linear response du."""
+    for beam, s in zip(system.beams, system.slices):
+        for e in system.histories.kernel(beam).elements:
+            if isinstance(e, ElementsWithHistory):
+                E, up, down = (e.strain_at((before + x * SMALL * du)[s]) for x in (0.0, 1.0, -1.0))
+                E += (up - down) / (2.0 * SMALL)
+                S, elastic = (x.evaluate(E, 0.0)[0] for x in (e, e.elastic_from(before[s])))
+                if np.max(np.abs(S - elastic)) > STIFFER * np.max(np.abs(elastic)):
+                    warn(f"{beam!r} yields before the buckling load, which is that of its elastic "
+                         "stiffness: bifurcations of scene.continuation() have the load of what "
+                         "yields", ModelWarning)
+                    return
 
 
 _FLUTTER = (
