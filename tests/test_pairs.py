@@ -559,6 +559,21 @@ def test_a_beam_that_turns_and_folds_finds_itself(monkeypatch, element):
     assert unbent[:10].all() and not touches[:20].any() and touches[-1]
 
 
+@pytest.mark.parametrize("turn", [1.0, 2.5, 4.5])
+def test_what_does_not_touch_is_solved_as_without_contact(turn):
+    """In the same iterations, with the same result: of a beam with itself, and beside a wall."""
+    EI = 1e7 * 0.02 * 0.01**3 / 12.0
+    alone = Scene(line(1.0, 24, 0.01, element=ELEMENTS[0], material=RUBBER)).clamp("left").moment(
+        "right", turn * EI, amplitude=lambda t: t)
+    state, run = alone.solve_static(), alone.run(1.0, increments=4)
+    for scene in (alone.contact(0, self_contact=True), alone.obstacle(Line((0, -2), (0, 1)))):
+        same, steps = scene.solve_static(), scene.run(1.0, increments=4)
+        assert same.message == state.message and steps.found_by == run.found_by
+        assert steps.iterations_at.tolist() == run.iterations_at.tolist()
+        assert_allclose(same.u, state.u, rtol=0.0, atol=1e-12)
+        assert_allclose(steps.u[-1], run.u[-1], rtol=0.0, atol=1e-12)
+
+
 def test_what_does_not_touch_is_seldom_looked_at(monkeypatch):
     """A step evaluates forces at least three times."""
     looks = {"look": 0, "search": 0}

@@ -56,7 +56,7 @@ class LinearSolver:
         #: nodes.
         self.coupled = bool(system.constraints.joints) or system.forces.couples_far
         #: True if it is only while changing elements do something.
-        self.at_times = not (system.constraints.joints or system.forces.distant)
+        self.at_times = not (system.constraints.joints or len(system.forces.border_rows))
         if not self.coupled:
             self.keep_band()
 

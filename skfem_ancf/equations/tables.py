@@ -189,7 +189,7 @@ class Tables:
             tables._user_defined = None
         forces = plain.forces._replace(
             contacts=system.forces.contacts.tables, clear=system.forces.clear,
-            pairs=system.forces.pairs,
+            rested=system.forces.rested, pairs=system.forces.pairs,
             custom=tables.handle if plain.forces.custom else 0)
         tables.plain = plain._replace(
             body=body, viscous=body if plain.viscous is plain.body else plain.viscous,

@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from ..actions.contact.tables import PASSED
 from ..actions.forces.kernels import nothing_touches, rests
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
@@ -153,8 +154,8 @@ class Unstable(LoadStepFailed):
 ITERATIONS = 8
 #: Of loose members: factors on the drag in tangents that are not definite, and the largest one.
 MORE_DRAG, MOST_DRAG = 30.0, 1e6
-#: How an iteration ends; the last is that of compiled code whose factors need LAPACK.
-CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE = range(5)
+#: How an iteration ends; INDEFINITE is that of compiled code whose factors need LAPACK.
+CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE, DIVERGES = range(6)
 
 
 @source
@@ -168,7 +169,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
     multipliers, phi, dm = m[0], m[1], m[2]
     by_band = target.definite and e.factors.flat.size > 0
     norms, loose = np.empty(3), 1.0 if largest(x[DRAG]) > 0.0 else 0.0
-    at_rest, last, clear, moving, k = False, False, False, target.moving, 0
+    touches = e.forces.contacts.number > 0 or e.forces.changing > 0
+    at_rest, last, clear, moving, k = False, False, not touches, target.moving, 0
     work, before, tol = 0.0, 0.0, rules.tol
     while True:
         # the last residual needs no tangent
@@ -179,6 +181,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             return NOT_FINITE, k, k, by_band and k > 0, UNSEEN
         residuals[k] = rho / size if size > 0.0 else 0.0
         clear = clear or nothing_touches(e.forces, u)
+        if not clear:
+            e.forces.clear[PASSED] += 1.0
         used, tol = tol, rules.tol if clear else rules.rough
         if k == 0:
             balanced = is_at_rest(rho, size, joint_gap, tol)
@@ -189,7 +193,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
                                                             rules.force_noise)
         if balanced and not moving:
             return CONVERGED, k + 1, k, by_band and k > 0, examine(e, u, stresses[0])
-        if k == rules.iterations:
+        if k == rules.iterations or k >= rules.patience and touches and (
+                e.forces.clear[PASSED] > 0.0):
             return NOT_CONVERGED, k + 1, k, by_band and k > 0, UNSEEN
         if last:
             balance(e, target, factors, BETWEEN, rules.mixed, g, x, m, stresses, norms)
@@ -210,8 +215,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             return SINGULAR, k + 1, k, False, UNSEEN
         if moving:
             add_multiple(1.0, moved, du)
-            clear = False
-        elif e.forces.contacts.number > 0 or e.forces.changing > 0:
+            clear = not touches
+        elif touches:
             clear = hold_back(e, target.at, loose, clear, u, R, du, dm) > 0
         moving = False
         add_multiple(1.0, du, u)
@@ -220,7 +225,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         works[k] = work / reference if reference > 0.0 else 0.0
         k += 1
         if rules.give_up > NEVER and diverges(rules.give_up, k - 1, works[k - 1]):
-            return NOT_CONVERGED, k, k, by_band, UNSEEN
+            return DIVERGES, k, k, by_band, UNSEEN
         contraction = work / before if before > 0.0 else 1.0
         last = (k >= FEWEST or at_rest) and is_small(work, contraction, tol, reference,
                                                      rules.noise)

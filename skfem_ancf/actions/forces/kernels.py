@@ -8,10 +8,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ...core.band import clear, dot
+from ...core.band import clear, copy, dot, largest
 from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import ELEMENTS, POSES, call_custom
-from ...core import F1, I1, MADE, apart, indices, shaped, source
+from ...core import F1, F2, I1, MADE, apart, indices, shaped, source
 from ..tables import add_each, add_products
 from ..contact.kernels import FAR, of_contacts, untouched
 from ..contact.pairs import candidates_of, pair_accept, pair_force, pair_tables
@@ -60,7 +60,8 @@ class ForceTables(NamedTuple):
     change their pattern; ``clear`` says where they do nothing, see
     :func:`~skfem_ancf.actions.contact.tables.is_clear`. ``paired`` of these are contact of members,
     with ``pairs``: their :class:`~skfem_ancf.actions.contact.pairs.PairTables`, or the addresses of
-    these in compiled code.
+    these in compiled code. ``rested`` are the last two displacements at which they were known to
+    rest, within the margin of ``clear``.
     """
 
     start: F1
@@ -82,6 +83,7 @@ class ForceTables(NamedTuple):
     clear: F1
     paired: int
     pairs: I1
+    rested: F2
 
 
 @source
@@ -159,6 +161,9 @@ def at_rest(tables, u0, u1):
 def rests(tables, u, less):
     """True if it is known that no changing element does anything at u, with a margin that is
     smaller by ``less``."""
+    old, new = tables.rested[0], tables.rested[1]
+    if less == 0.0 and (largest(u - new) <= 0.0 or largest(u - old) <= 0.0):
+        return True  # it is asked several times in an iteration
     if not is_clear(tables.clear, u, less):
         return False
     searches = 0.0
@@ -168,7 +173,12 @@ def rests(tables, u, less):
         if pair.rows.starts.size > 0 and not straight(
                 pair.rows, candidates_of(pair).cut, _used(pair, u)):
             return False
-    return searches == tables.clear[SEARCHED]  # the margin is that of pairs not in one stretch
+    if searches != tables.clear[SEARCHED]:
+        return False  # the margin is that of pairs not in one stretch
+    if less == 0.0:
+        copy(new, old)
+        copy(u, new)
+    return True
 
 
 @source
@@ -197,6 +207,9 @@ def _add_pairs(tables, span, u0, u1, f):
         tables.clear[SEARCHED] += pair.found[1]
         add_each(total, pair.used, out)
     set_clear(tables.clear, u1, 0.5 * SAFE * least)
+    old, new = tables.rested[0], tables.rested[1]
+    copy(u1, new)
+    old[0], new[0] = np.nan, new[0] if least > 0.0 else np.nan
 
 
 @source

@@ -32,10 +32,10 @@ class Forces:
     ``remembering`` those with a memory.
 
     ``couples_far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given,
-    with places that differ by more than 1; ``distant`` if one always does. ``symmetric``: all
+    with places that differ by more than 1. ``symmetric``: all
     derivatives are symmetric. ``resists``: there are velocity-dependent forces. ``masses``
-    contribute to the mass matrix; ``contacts`` are the obstacles. ``clear`` is a table of
-    :func:`~skfem_ancf.actions.forces.kernels.rests`.
+    contribute to the mass matrix; ``contacts`` are the obstacles. ``clear`` and ``rested`` are
+    tables of :func:`~skfem_ancf.actions.forces.kernels.rests`.
     """
 
     #: The vectors are ``start + B u``: the start, and the rows, DOFs and weights of B.
@@ -53,7 +53,7 @@ class Forces:
     elements = custom = changing = remembering = parts = _springs = _blocks = _slices = masses
     _paired: Any = masses
     rows = size = paired = 0
-    distant = couples_far = resists = False
+    couples_far = resists = False
     symmetric = True
     contacts = Contacts((), 0)
     #: Entries of the last tangent of a step: rows, columns and values. Those of the last tangent of
@@ -65,7 +65,7 @@ class Forces:
                  places: Array | None = None) -> None:
         self._N, self._bandwidth, self.border_rows = N, bandwidth, np.zeros((0, N))
         if not elements:
-            self.clear = np.zeros(SEEN + 2 * N)
+            self.clear, self.rested = np.zeros(SEEN + 2 * N), np.full((2, N), np.nan)
             return
         self.masses = [e for e in elements if e.mass_entries() is not None]
         self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
@@ -101,12 +101,11 @@ class Forces:
                 at = dofs[::2] // 2
                 weights[:, at] = np.maximum(weights[:, at], element.weights)
         self._pair()
-        self.clear, u = clear_table(weights), np.zeros(N)
+        self.clear, self.rested, u = clear_table(weights), np.full((2, N), np.nan), np.zeros(N)
         if self.changing:
             set_clear(self.clear, u, 0.5 * SAFE * self._least_gap(u))
             self.clear[SEARCHED] = sum(pair.found[1] for pair in self.pairs)
-        self.distant = bool(self._in_border.any())
-        self.couples_far = self.distant or bool(self.changing)
+        self.couples_far = bool(len(self.border_rows) or self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
         # those of user-defined laws first, then in the order of the parts
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
@@ -187,7 +186,7 @@ class Forces:
         other.remembering, other.custom = new, [of.get(id(e), e) for e in self.custom]
         other.changing = [(of.get(id(e), e), at) for e, at in self.changing]
         other._pair(fresh=True)
-        other.clear = self.clear.copy()
+        other.clear, other.rested = self.clear.copy(), self.rested.copy()
         if memory.size:
             other.contacts = self.contacts.after(memory)
         return other
@@ -207,7 +206,7 @@ class Forces:
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._border[0], self._border[1],
             handle if self.custom or self.changing else 0, self.contacts.tables,
-            len(self.changing), self.clear, self.paired, self.pairs)
+            len(self.changing), self.clear, self.paired, self.pairs, self.rested)
 
     def acting_rows(self, u: Array, t: float) -> tuple[Array, Array]:
         """Derivatives of positions of concentrated elements, and forces of items, (k, N) each."""
@@ -462,4 +461,4 @@ _X, _I = np.zeros(0), np.zeros(0, np.int64)
 #: For scenes without force elements.
 NO_FORCES = constant(ForceTables(
     _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS, 0,
-    _X, 0, _I))
+    _X, 0, _I, _X.reshape(2, 0)))

@@ -90,7 +90,9 @@ class Search:
             places[surfaces.dofs])
         self.height = h = float(np.min(f.heights))
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
-        self._seed_zeta = (2.0 * np.arange(m) + 1.0) / m - 1.0
+        e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(
+            (2.0 * np.arange(m) + 1.0) / m - 1.0, len(f.sides))
+        self._seeds = e, zeta, f.dofs[e], *surfaces.curve(e, zeta, 0)
         self._near = 0.6 * f.lengths / m + f.offsets
         self.joined = self._joined(solids)
         self._stretches = Stretches(sharp, np.diag(allowed), f)
@@ -126,9 +128,8 @@ class Search:
 
     def search(self, z: Array) -> None:
         """Find the :class:`Candidates` at displacements z; the callback of kernels."""
-        x, f, m = self.surfaces.outside(z)[0], self.surfaces.facets, len(self._seed_zeta)
-        e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(self._seed_zeta, len(f.sides))
-        y = self.surfaces.along(e, zeta, 0, z)
+        x, (e, zeta, dofs, weights, start) = self.surfaces.outside(z)[0], self._seeds
+        y = start + np.einsum("nb,nb->n", weights, z[dofs])
         cut = self._group(z)
         room = self._room(x, y, e) / self.height
         known, skin = NOBODY, room
@@ -251,10 +252,11 @@ class Search:
 
     def entered(self, z0: Array, z1: Array) -> complex | None:
         """A place where an axis, or the middle of a solid, enters a solid, z0 to z1, or None."""
-        f, (ends, chains, s, members) = self.surfaces.facets, self._axes(z0, COARSE)
-        solid = np.flatnonzero(~np.isin(f.members, members))  # edges of bodies and domains
+        f = self.surfaces.facets
+        solid = np.flatnonzero(~np.isin(f.members, f.members[f.spans > 0.0]))  # bodies, domains
         if not len(solid):
             return None
+        ends, chains, s, members = self._axes(z0, COARSE)
         sides = [np.array([self.surfaces.along(solid, np.full(len(solid), end), 0, z)
                            for end in (-1.0, 1.0)]) for z in (z0, z1)]
         known = np.unique(f.members[solid])

@@ -31,6 +31,7 @@ class Stretches:
         bottom, top = (np.flatnonzero(own & (f.spans > 0.0) & (f.sides == side))
                        for side in (-1, 1))
         self._chains, far = f.chains[bottom], 1.0 + np.max(f.places + f.spans)
+        self._others = (np.diff(self._chains) != 0).tolist()
         places = self._chains * far + f.places[bottom]
         self.of, at = (np.where(touch[g.members], np.searchsorted(
             places, g.chains * far + g.places + 0.5 * g.spans, "right") - 1, -1)
@@ -78,19 +79,20 @@ class Stretches:
         w, dofs = rows.weights[:, :E * each], rows.dofs[:, :E * each]
         t = (rows.starts[:E * each] + np.sum(w * z[dofs], axis=0)).reshape(E, each).sum(axis=1)
         angles = np.cumsum(np.append(0.0, np.angle(t[1:] * np.conj(t[:-1]))))
-        part, k, low, high = np.ones(E, np.int64), 1, angles[0], angles[0]
-        for e in range(1, E):
-            low, high = min(low, angles[e]), max(high, angles[e])
-            other = int(self._chains[e] != self._chains[e - 1])  # no stretch with the part before
-            if other or high - low > TURN:
-                k, low, high = k + 1 + other, angles[e], angles[e]
-            part[e] = k
-        ends, level = np.zeros((2, k + 1), np.int64), np.round(angles / EQUAL)
+        parts, k, low, high = [1], 1, angles[0], angles[0]
+        for angle, other in zip(angles[1:].tolist(), self._others):
+            low, high = min(low, angle), max(high, angle)
+            if other or high - low > TURN:  # another chain has no stretch with the part before
+                k, low, high = k + 1 + other, angle, angle
+            parts.append(k)
+        part, level = np.array(parts), np.round(angles / EQUAL)
+        ends, half = np.zeros((2, k + 1), np.int64), each // 2
+        first, last = (part.searchsorted(np.arange(k + 2), side) for side in ("left", "right"))
         for s in range(k + 1):
-            own = np.flatnonzero((part == s) | (part == s + 1))
+            own = level[first[s]:last[s + 1]]
             if len(own):
-                low, high = np.argmin(level[own]), len(own) - 1 - np.argmax(level[own][::-1])
-                ends[:, s] = own[[low, high]] * each + each // 2
+                low, high = np.argmin(own), len(own) - 1 - np.argmax(own[::-1])
+                ends[:, s] = (first[s] + np.array([low, high])) * each + half
         of = np.array([part - 1, part][-k:])[:, self._elements]  # one part is one stretch
         fits = np.ones(k + 1, bool)
         fits[of[~(progress(rows, Cut(of, ends), z) > 0.0)]] = False
