@@ -153,7 +153,7 @@ class Unstable(LoadStepFailed):
 #: Approximate iterations to an equilibrium, by which work in NumPy is counted.
 ITERATIONS = 8
 #: Of loose members: factors on the drag in tangents that are not definite, and the largest one.
-MORE_DRAG, MOST_DRAG = 30.0, 1e6
+MORE_DRAG, MOST_DRAG = 3.0, 1e6
 #: How an iteration ends; INDEFINITE is that of compiled code whose factors need LAPACK.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE, DIVERGES = range(6)
 
