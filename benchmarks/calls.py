@@ -6,6 +6,7 @@ most calls. ``tests/test_calls.py`` bounds both.
 """
 
 import cProfile
+import gc
 import os
 import pstats
 import sys
@@ -117,11 +118,13 @@ def profile(name, kernels=True):
         return quiet
 
     Backend._in_numpy = in_numpy if kernels else left_out
+    gc.disable()  # calls that it makes, as those of other libraries, are not the task's
     try:
         one.enable()
         task()
     finally:
         one.disable()
+        gc.enable()
         Backend._in_numpy = in_numpy
     return one
 

@@ -559,8 +559,8 @@ def check_flow(body, u, before):
     m, past, strain = body.beam.material, body.past, body.strain(u)
     flow, back, p = past[:3], past[3:6], past[6]
     h, y = m.hardening, m.yield_stress
-    y = (np.interp(p, *h.T) if isinstance(h, np.ndarray) else y + h * p if np.ndim(h) == 0 else
-         y + h[0] * (1.0 - np.exp(-h[1] * p)) + h[2] * p)
+    y = (np.interp(p, *h.T) if isinstance(h, np.ndarray) else y + h * p if isinstance(h, float) else
+         y + h.saturation * (1.0 - np.exp(-h.rate * p)) + h.linear * p)
     change = past - (0.0 * past if before is None else before)
     if not body.beam.has_sections:
         E = m.E / (1.0 if m.plane == "stress" else 1.0 - m.nu**2)
