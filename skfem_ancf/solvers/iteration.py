@@ -200,17 +200,11 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             balance(e, target, factors, BETWEEN, rules.mixed, g, x, m, stresses, norms)
         if moving:
             _move(e, target, g, moved, u, R, phi)
-        if by_band:
-            if e.forces.changing > 0 and not clear and not rests(e.forces, u, 0.0):
-                return INDEFINITE, k + 1, k, False, UNSEEN
-            if solve_definite(e.K, e.factors, e.fixed, R, du) == 0:
-                return INDEFINITE, k + 1, k, False, UNSEEN
-            good = True
-        else:
-            good = _solve(e, target, loose, x, m)
-        before, work = work, np.inf
-        if good:
-            work = correction_size(e, R, du, phi, dm)
+        if by_band and (e.forces.changing > 0 and not clear and not rests(e.forces, u, 0.0)
+                        or solve_definite(e.K, e.factors, e.fixed, R, du) == 0):
+            return INDEFINITE, k + 1, k, False, UNSEEN
+        good = by_band or _solve(e, target, loose, x, m)
+        before, work = work, correction_size(e, R, du, phi, dm) if good else np.inf
         if not work < 1e300:
             return SINGULAR, k + 1, k, False, UNSEEN
         if moving:
