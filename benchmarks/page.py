@@ -11,6 +11,7 @@ code that is timed has changed since the commit of the run, the page says which.
 import argparse
 import csv
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -297,6 +298,10 @@ def main(arguments=None):
     options = parser.parse_args(arguments)
     if options.take:
         take(options.take, Path(options.results))
+        for shown in (ROOT / "docs").glob("bench_*.png"):  # of the same run as the tables
+            made = Path(options.take) / shown.name.removeprefix("bench_")
+            if made.exists():
+                shutil.copyfile(made, shown)
     results = read(options.results)
     for page in PAGES:
         text = (ROOT / page).read_text(encoding="utf-8")
