@@ -342,9 +342,9 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     bounded = bool(system.forces.contacts.obstacles or system.constraints.missing_supports)
     for method in ["mixed", "newton", *(("all",) if smallest else ())]:
         if method == "newton" and bounded:
+            if system.histories.path_dependent:
+                continue  # what yields needs smaller increments: descents fail
             method = "descent"
-        if method == "descent" and system.histories.path_dependent:
-            continue  # what yields needs smaller increments: descents fail
         try:
             if method == "all":
                 logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)

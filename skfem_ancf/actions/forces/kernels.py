@@ -209,7 +209,9 @@ def _add_pairs(tables, span, u0, u1, f):
     set_clear(tables.clear, u1, 0.5 * SAFE * least)
     old, new = tables.rested[0], tables.rested[1]
     copy(u1, new)
-    old[0], new[0] = np.nan, new[0] if least > 0.0 else np.nan
+    old[0] = np.nan  # of another margin: no displacement equals NaN
+    if not least > 0.0:
+        new[0] = np.nan
 
 
 @source

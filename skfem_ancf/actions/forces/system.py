@@ -32,10 +32,10 @@ class Forces:
     ``remembering`` those with a memory.
 
     ``couples_far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given,
-    with places that differ by more than 1. ``symmetric``: all
-    derivatives are symmetric. ``resists``: there are velocity-dependent forces. ``masses``
-    contribute to the mass matrix; ``contacts`` are the obstacles. ``clear`` and ``rested`` are
-    tables of :func:`~skfem_ancf.actions.forces.kernels.rests`.
+    with places that differ by more than 1. ``symmetric``: all derivatives are symmetric.
+    ``resists``: there are velocity-dependent forces. ``masses`` contribute to the mass matrix;
+    ``contacts`` are the obstacles. ``clear`` and ``rested`` are tables of
+    :func:`~skfem_ancf.actions.forces.kernels.rests`.
     """
 
     #: The vectors are ``start + B u``: the start, and the rows, DOFs and weights of B.

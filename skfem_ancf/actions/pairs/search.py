@@ -40,6 +40,12 @@ def powers(zeta: Array, n: int, order: int) -> Array:
     return out
 
 
+def displaced(curve: tuple[Array, Array], dofs: Array, z: Array) -> Array:
+    """What :meth:`Surfaces.curve` returns for facets with DOFs (n, B), at displacements z, (n,)."""
+    weights, start = curve
+    return start + np.einsum("nb,nb->n", weights, z[dofs])
+
+
 class Surfaces:
     """The facets of a scene, with the weights of the points of their surfaces."""
 
@@ -61,12 +67,11 @@ class Surfaces:
 
     def along(self, e: Array, zeta: Array, order: int, z: Array) -> Array:
         """A derivative of facets by zeta at displacements z, (n,)."""
-        weights, start = self.curve(e, zeta, order)
-        return start + np.einsum("nb,nb->n", weights, z[self.facets.dofs[e]])
+        return displaced(self.curve(e, zeta, order), self.facets.dofs[e], z)
 
     def outside(self, z: Array) -> tuple[Array, Array]:
         """Points of the surfaces and their outer normals, (P,) each."""
-        r, t = (start + np.einsum("nb,nb->n", w, z[self.dofs]) for w, start in self.points)
+        r, t = (displaced(curve, self.dofs, z) for curve in self.points)
         n = 1j * t / np.abs(t)
         return r + self.shift * n, self.facets.sides[self.facets.of] * n
 
@@ -92,7 +97,7 @@ class Search:
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
         e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(
             (2.0 * np.arange(m) + 1.0) / m - 1.0, len(f.sides))
-        self._seeds = e, zeta, f.dofs[e], *surfaces.curve(e, zeta, 0)
+        self._seeds = e, zeta, surfaces.curve(e, zeta, 0), f.dofs[e]
         self._near = 0.6 * f.lengths / m + f.offsets
         self.joined = self._joined(solids)
         self._stretches = Stretches(sharp, np.diag(allowed), f)
@@ -128,8 +133,8 @@ class Search:
 
     def search(self, z: Array) -> None:
         """Find the :class:`Candidates` at displacements z; the callback of kernels."""
-        x, (e, zeta, dofs, weights, start) = self.surfaces.outside(z)[0], self._seeds
-        y = start + np.einsum("nb,nb->n", weights, z[dofs])
+        x, (e, zeta, curve, dofs) = self.surfaces.outside(z)[0], self._seeds
+        y = displaced(curve, dofs, z)
         cut = self._group(z)
         room = self._room(x, y, e) / self.height
         known, skin = NOBODY, room
