@@ -73,14 +73,19 @@ def stretches_of(f: Facets, touch: Array, facets: Facets, moves: Array, places: 
     weights, dofs = np.abs(x[:, :-1]), f.dofs[e]
     sums = [np.sum(weights * own / np.maximum(most[dofs], TINY), axis=1)
             for most, own in zip(moves, (places[dofs], ~places[dofs]))]
-    return of, Rows(*(np.ascontiguousarray(y, kind) for y, kind in (
-        (dofs.T, np.int64), (x[:, :-1].T, complex), (x[:, -1], complex), (least, float),
-        (np.maximum(*sums), float), (at[e], np.int64), (chains, np.int64))), n - 1)
+    return of, Rows(_packed(dofs.T, np.int64), _packed(x[:, :-1].T, complex),
+                    _packed(x[:, -1], complex), _packed(least, float),
+                    _packed(np.maximum(*sums), float), _packed(at[e], np.int64),
+                    _packed(chains, np.int64), n - 1)
 
 
+_I, _C = np.zeros((2, 0), np.int64), np.zeros((2, 0), complex)
 #: Of members that cannot touch themselves.
-NO_ROWS = Rows(np.zeros((2, 0), np.int64), np.zeros((2, 0), complex), np.zeros(0, complex),
-               *np.zeros((2, 0)), *np.zeros((2, 0), np.int64), 1)
+NO_ROWS = Rows(_I, _C, _C[0], np.zeros(0), np.zeros(0), _I[0], _I[0], 1)
+
+
+def _packed(x, kind):
+    return np.ascontiguousarray(x, dtype=kind)
 
 
 def _controls(n, C):
