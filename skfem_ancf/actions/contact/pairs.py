@@ -39,6 +39,8 @@ OPPOSED = -0.2
 SAME = 0.8
 #: Iterations for the place of a mean force; change of a gap in heights below which none is needed.
 MEANS, CLOSE = 8, 1e-9
+#: Largest part of its change by which a gap may jump between facets for work that is exact.
+JUMP = 0.5
 #: The gap where nothing is.
 NOTHING = 1e300
 #: Distance in heights for which a list of candidates is enough, and the largest one.
@@ -452,9 +454,14 @@ def _mean_place(t, f0, f1, p, e, s0, s1, given):
         low, below = where(going & up, zeta, low), where(going & up, left, below)
         high, above = where(up, high, where(going, zeta, high)), where(
             up, above, where(going, left, above))
+    # If the gap jumps between facets by as much as it changes, work that is exact would need a
+    # stiffness of any size and sign: then it is less exact, and nearly the given one.
     change = left + given
-    good = (np.abs(given) > CLOSE * t.height) & (np.abs(change) > 0.3 * np.abs(given))
-    return zeta, where(good, given, 1.0) / where(good, change, 1.0)
+    jumps = np.abs(left) > JUMP * np.abs(change)
+    exact = np.abs(given) > CLOSE * t.height
+    inexact = 1.0 - JUMP * JUMP * change / where(jumps, left, 1.0)
+    return zeta, where(jumps, inexact, where(exact, given, 1.0) / where(
+        exact & ~jumps, change, 1.0))
 
 
 @source
