@@ -497,6 +497,29 @@ def test_nothing_touches_within_the_margin(element):
             assert least > 0.0
 
 
+@pytest.mark.parametrize("element", ELEMENTS[1:3], ids=repr)
+def test_the_mean_force_of_a_small_move_is_near_that_at_its_ends(element):
+    """Also where a corner passes from one facet to the next: the gap jumps there by more than it
+    changes, and work that is exact would need any force."""
+    h, rng = 0.01, np.random.default_rng(1)
+    strip = line(0.2, 4, h, (-0.1, 0.0), element)
+    post = line(0.1, 2, h, (0.002, 0.52 * h), element, angle=0.5 * np.pi - 0.05)
+    layout = Layout(strip, post)
+    contact = recalled(BodyContact().bound_on(layout)[0])
+
+    def moved(way):
+        u = np.zeros(layout.N)
+        u[strip.N:].view(complex)[::post.nd // 2] = way
+        return u.reshape(-1, 2)
+
+    for _ in range(800):
+        way = rng.uniform(-0.03, 0.03) - 1j * rng.uniform(3.5e-4, 6e-4)
+        small = rng.uniform(-3e-4, 3e-4) + 1j * rng.uniform(-1, 1) * 10**rng.uniform(-9, -5)
+        x, y = moved(way), moved(way + small)
+        ends = [np.abs(contact.force(z, 0.0 * z, 0.0)).max() for z in (x, y)]
+        assert 0.0 < np.abs(contact.mean_force(x, y, 0.0, 1e-3)).max() < 1.15 * max(ends)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_contact_is_that_of_a_search_in_each_evaluation(monkeypatch, friction):
     """Also of fast, thin members; what is not looked at does not touch."""
