@@ -39,8 +39,6 @@ OPPOSED = -0.2
 SAME = 0.8
 #: Iterations for the place of a mean force; change of a gap in heights below which none is needed.
 MEANS, CLOSE = 8, 1e-9
-#: Largest part of its change by which a gap may jump between facets for work that is exact.
-JUMP = 0.5
 #: The gap where nothing is.
 NOTHING = 1e300
 #: Distance in heights for which a list of candidates is enough, and the largest one.
@@ -142,7 +140,6 @@ class Meeting(NamedTuple):
     zeta: F1
     before: F1
     after: F1
-    share: F1  # correction of the stiffness, for exact work
 
 
 PAIRS: TypeAlias = PairTables
@@ -407,7 +404,7 @@ def meet(t, same, f0, f1):
         facets[p] = where(f1.e[p] < 0, f0.e[p], f1.e[p])
     at = np.nonzero(facets >= 0)[0]
     n, of = at.size, facets[at]
-    zeta, before, after, share = np.empty(n), np.empty(n), np.empty(n), np.ones(n)
+    zeta, before, after = np.empty(n), np.empty(n), np.empty(n)
     for i in indices(n):
         p, e = at[i], of[i]
         begins = t.begins[p]
@@ -419,8 +416,8 @@ def meet(t, same, f0, f1):
             s0, g0 = _other(t, f0, p, e, guess, there)
             s1, g1 = _other(t, f1, p, e, guess, here)
             before[i], after[i] = begins - g0, begins - g1
-            zeta[i], share[i] = _mean_place(t, f0, f1, p, e, s0, s1, g1 - g0)
-    return Meeting(at, of, zeta, before, after, share)
+            zeta[i] = _mean_place(t, f0, f1, p, e, s0, s1, g1 - g0)
+    return Meeting(at, of, zeta, before, after)
 
 
 @source
@@ -435,7 +432,7 @@ def _other(t, found, p, e, guess, known):
 
 @source
 def _mean_place(t, f0, f1, p, e, s0, s1, given):
-    """Where between two places the gap changes as ``given``, and what that is over the change."""
+    """Where between two places the gap changes as ``given``, or nearly so."""
     # The gap is least at the closest point, so there is one.
     low, high = np.minimum(s0, s1), np.maximum(s0, s1)
     x, y = f0.x[p], f1.x[p]
@@ -454,14 +451,7 @@ def _mean_place(t, f0, f1, p, e, s0, s1, given):
         low, below = where(going & up, zeta, low), where(going & up, left, below)
         high, above = where(up, high, where(going, zeta, high)), where(
             up, above, where(going, left, above))
-    # If the gap jumps between facets by as much as it changes, work that is exact would need a
-    # stiffness of any size and sign: then it is less exact, and nearly the given one.
-    change = left + given
-    jumps = np.abs(left) > JUMP * np.abs(change)
-    exact = np.abs(given) > CLOSE * t.height
-    inexact = 1.0 - JUMP * JUMP * change / where(jumps, left, 1.0)
-    return zeta, where(jumps, inexact, where(exact, given, 1.0) / where(
-        exact & ~jumps, change, 1.0))
+    return zeta
 
 
 @source
@@ -548,15 +538,20 @@ def touch_of(t, f0, f1, met):
         s, stiffness = t.sides[t.of[p]] * t.offsets[t.of[p]], stiffness_of(t, p, e)
         a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
         by_gap, by_slip = mean_slope(a, b, t.sides[e], s), slip_row(a, b, s)
+        # where the gap is that of another facet at one end, its mean derivative is inclined
+        way = way_along(a, b, by_slip)
+        missing = met.before[i] - met.after[i] - way_along(a, b, by_gap)
+        inclined = missing * way / (np.maximum(way * way, missing * missing)
+                                    + (CLOSE * t.height) ** 2)
         for v in range(COMPONENTS // 2):
-            put(gap, v, i, by_gap[v])
+            put(gap, v, i, by_gap[v] + scaled(inclined, by_slip[v]))
             put(slip, v, i, by_slip[v])
             put(moved, v, i, b[v] - a[v])
-        k[i] = stiffness * met.share[i]
+        k[i] = stiffness
         if t.friction > 0.0:
             path, held, _ = slip_along(t, f1, p, e)
             # what has no anchor slips from where it was at the start of the step
-            new, way = held == 0.0, way_along(a, b, by_slip)
+            new = held == 0.0
             trial[i] = stiffness * where(new, way, path)
             spring[i] = stiffness * where(new, 1.0 * (way != 0.0), held)
     return Touch(met.at, k, met.before, met.after, np.zeros(n), moved, gap, slip, trial, spring)
