@@ -112,6 +112,7 @@ class PairTables(NamedTuple):
     zeta: F1
     areas: F1
     begins: F1  # gaps at which the pressure begins
+    opposed: F1  # largest cosine of the angle to normals of surfaces that they touch
     point_dofs: I2  # (B, P)
     N: C2  # weights of places, (B, P)
     D: C2  # and of slopes
@@ -324,7 +325,7 @@ def _face(t, known, near, found):
         left = where(g < begins, -DEEPEST * t.height - g, g - begins)
         beyond[i] = where(joined, NOTHING, left)
         fits = there & (g < begins) & (g > -DEEPEST * t.height) & (
-            dot(outer, found.normal[p]) < OPPOSED)
+            dot(outer, found.normal[p]) < t.opposed[p])
         away[i] = where(fits, np.abs(g) + np.maximum(np.abs(s) - 1.0, 0.0) * t.lengths[e], NOTHING)
         away[i] = where(joined, NOTHING, away[i])
         zeta[i], gap[i], of[i], facets[i] = s, g, p, e

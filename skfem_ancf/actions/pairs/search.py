@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from ...core import Array, Packed, handle_of
-from ..contact.pairs import (APART, EDGE, ON, SKIN, Candidates, Groups, PairTables, Seeds, facing,
+from ..contact.pairs import (APART, EDGE, ON, OPPOSED, SAME, SKIN, Candidates, Groups, PairTables, Seeds, facing,
                              may_touch, together)
 from ..contact.points import cross, dot
 from ..contact.stretches import Cut
@@ -119,6 +119,7 @@ class Search:
                 f.ends.clip(-1.0, 1.0).T * (1.0 + np.where(np.abs(f.ends) == 1.0, EDGE, ON).T),
                 float),
             joined=_packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
+            opposed=np.where(np.arange(len(f.of)) < len(sharp.of), OPPOSED, SAME),
             point_dofs=_packed(surfaces.dofs.T, np.int64), N=_packed(N.T, complex),
             D=_packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
             found=np.zeros(3, np.int64), seen=np.zeros(n, complex), moves=self.weights,
