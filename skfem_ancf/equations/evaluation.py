@@ -216,6 +216,22 @@ def hold_back(e, t, loose, clear, u, R, du, dm):
 
 
 @source
+def motion_is_clear(e, t, motion):
+    """True if it is known that nothing touches on straight ways between displacements (n, N)."""
+    n, N = motion.shape
+    scratch = np.zeros(N)
+    for k in range(n):
+        u = motion[k]
+        if not nothing_touches(e.forces, u):
+            contact_work(e.forces, t, u, u, scratch)
+            if not nothing_touches(e.forces, u):
+                return False
+        if k + 1 < n and not way_is_clear(e.forces, t, u, motion[k + 1] - u, scratch):
+            return False
+    return True
+
+
+@source
 def _work(e, t, u, du, scratch):
     """Product of the contact force at u and du."""
     return 0.0 if nothing_touches(e.forces, u) else contact_work(e.forces, t, u, du, scratch)

@@ -76,6 +76,16 @@ class Histories:
         other._have(self.forces, self.of_forces.size, history, span)
         return other
 
+    def part_of(self, other: "Histories", history: Array) -> Array:
+        """The history of the same scene without contact, from one of all."""
+        n = self.of_forces.size  # angles of springs are the last of obstacles
+        turns = self.forces.contacts.turns.size if n else 0
+        out = self.rest.copy()
+        out[n - turns:n] = history[other.of_forces.size - turns:other.of_forces.size]
+        for key, part in self._parts.items():
+            out[part] = history[other._parts[key]]
+        return out
+
     def kernel(self, beam: Beam) -> Any:
         """The kernel of a beam with this history."""
         past = self.past(beam)

@@ -269,6 +269,18 @@ class System:
         """Solves with the mass matrix, supports and joints."""
         return MassSolver(self)
 
+    @shared
+    def _apart(self):
+        given = list(self._given)
+        given[6] = [e for e in given[6] if not (e.groups or hasattr(e, "broad_search"))]
+        return System(*given)
+
+    def apart(self, history: Array | None) -> "tuple[System, Array | None]":
+        """The equations without contact of members and obstacles, and their part of a history."""
+        free, ours = self._apart, self.histories
+        return (free if self.clock is None else free.at(self.clock),
+                None if history is None else free.histories.part_of(ours, history))
+
     # loads
 
     def at(self, t: float) -> "System":

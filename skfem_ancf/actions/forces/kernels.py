@@ -278,7 +278,7 @@ def count_passed(tables, u0, u1):
         tables.clear[PASSED] += 1.0
 
 
-@source
+@apart("contacts", ForceTables, float, F1, F1, F1, returns=bool)
 def way_is_clear(tables, t, u, du, f):
     """True if it is known that nothing touches on the way from u, where nothing does, along du; f
     is workspace."""

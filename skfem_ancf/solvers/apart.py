@@ -1,0 +1,103 @@
+"""Motions from one displacement to another, to see that nothing touches on the way.
+
+A straight line in the degrees of freedom would shorten what turns far. Here each node turns by its
+part of the whole, with its slopes, and chords between nodes turn by the mean of both ends.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ..actions.pairs.sweep import swept_apart
+from ..beam.kinematics import tangents
+from ..core import Array
+from ..equations.evaluation import motion_is_clear
+from ..equations.system import System
+
+#: Largest rotation of a node between two displacements of a motion, in radians, and their number.
+TURN, MOST = 0.7, 40
+
+
+def stays_clear(system: System, t: float, *ways: Array) -> bool:
+    """True if it is known that nothing touches at a displacement (N,), or from one to another."""
+    motion = motion_between(system, *ways) if len(ways) > 1 else np.array(ways)
+    if motion is None:
+        return False
+    run, forces = system.backend.of(motion_is_clear), system.forces
+    if len(motion) < 3 or forces.contacts.obstacles:
+        return bool(run(t, motion))
+    clear = np.all([swept_apart(search, motion.view(complex)[:, pair.used])
+                    for search, pair in zip(forces._searches, forces.pairs)], axis=0)
+    return all(clear[k] or run(t, motion[k:k + 2]) for k in range(len(clear))) and bool(
+        run(t, motion[-1:]))
+
+
+def motion_between(system: System, u0: Array, u1: Array) -> Array | None:
+    """Displacements (n, N) of a motion of shapes from u0 to u1; None if a solid turns far, or a
+    beam many times."""
+    # Fixed and joined nodes go straight, so that joints of places hold.
+    turns = [_turns(beam, u0[s], u1[s]) for beam, s in zip(system.beams, system.slices)]
+    solid = [np.abs(_turns_of_solid(one, u0[s], u1[s])).max() for one, s in zip(
+        system.members[len(turns):], system.slices[len(turns):])]
+    most = max([0.0, *(np.abs(turn).max() for one in turns for turn in one)])
+    n = max(1, int(np.ceil(most / TURN)))
+    if max(solid, default=0.0) > TURN or n > MOST:
+        return None
+    share = np.linspace(0.0, 1.0, n + 1)[:, None]
+    out = u0 + share * (u1 - u0)
+    if n > 1:
+        held = ~system.constraints.free
+        held[system.constraints.slopes[1]] = True
+        for beam, s, of in zip(system.beams, system.slices, turns):
+            _turn(beam, u0[s], u1[s], of, held[s], share, out[:, s])
+        out[[0, -1]] = u0, u1
+    return out
+
+
+def _turns(beam: Any, u0: Array, u1: Array) -> list[Array]:
+    """Rotations of the nodes of each chain, the least where it moves least."""
+    turn = np.angle(tangents(beam, u1) * tangents(beam, u0).conj())
+    if np.abs(turn).max() < TURN:
+        return [turn]
+    moved, out = np.abs((u1 - u0).view(complex)[::beam.nd // 2]), []
+    for nodes in _chains(beam):
+        one = np.unwrap(turn[nodes])
+        out.append(one - 2.0 * np.pi * np.rint(one[np.argmin(moved[nodes])] / (2.0 * np.pi)))
+    return out
+
+
+def _chains(beam):
+    """The nodes of each chain."""
+    left, right = beam.mesh.t
+    first = np.flatnonzero(np.diff(beam.mesh.chains, prepend=-1))
+    return [np.append(a[0], b) for a, b in zip(np.split(left, first[1:]), np.split(right, first[1:]))]
+
+
+def _turns_of_solid(one, u0, u1):
+    """Rotations of a body's director, or of lines between points of a domain."""
+    a, b = ((one.q0 + u).view(complex) for u in (u0, u1))
+    if len(a) > 2:
+        a, b = np.diff(a), np.diff(b)
+    return np.angle(b * a.conj())[-1 if len(a) == 2 else 0:]
+
+
+def _turn(beam, u0, u1, turns, held, share, out):
+    """Set displacements (n, N) of a beam that turns."""
+    k = beam.nd // 2
+    a, b = ((beam.q0 + u).view(complex).reshape(-1, k) for u in (u0, u1))
+    fixed = held.reshape(-1, beam.nd)[:, :2].any(axis=1)
+    for nodes, turn in zip(_chains(beam), turns):
+        def turned(x, y, turn):
+            return np.exp(1j * share * turn) * (x + share * (y * np.exp(-1j * turn) - x))
+
+        z = np.stack([turned(a[nodes, j], b[nodes, j], turn) for j in range(k)], axis=2)
+        x, y = a[nodes, 0], b[nodes, 0]
+        places = np.cumsum(turned(np.diff(x, prepend=0.0), np.diff(y, prepend=0.0), np.append(
+            turn[0], 0.5 * (turn[1:] + turn[:-1]))), axis=1)
+        at = np.flatnonzero(fixed[nodes])
+        if not len(at):
+            at = np.array([np.argmin(np.abs(y - x))])
+        lost = x[at] + share * (y - x)[at] - places[:, at]
+        z[:, :, 0] = [way + np.interp(np.arange(len(x)), at, d) for way, d in zip(places, lost)]
+        dofs = (beam.nd * nodes[:, None] + np.arange(beam.nd)).ravel()
+        out[:, dofs] = z.reshape(len(share), -1).view(float) - beam.q0[dofs]
