@@ -271,15 +271,15 @@ class System:
 
     @shared
     def _apart(self):
-        given = list(self._given)
-        given[6] = [e for e in given[6] if not (e.groups or hasattr(e, "broad_search"))]
-        return System(*given)
+        given, elements = list(self._given), self._given[6]
+        given[6] = tuple([e for e in elements if not (e.groups or hasattr(e, "broad_search"))])
+        return System(*given) if len(given[6]) < len(elements) else None
 
-    def apart(self, history: Array | None) -> "tuple[System, Array | None]":
-        """The equations without contact of members and obstacles, and their part of a history."""
-        free, ours = self._apart, self.histories
-        return (free if self.clock is None else free.at(self.clock),
-                None if history is None else free.histories.part_of(ours, history))
+    @property
+    def apart(self) -> "System | None":
+        """The equations without contact of members and obstacles; None if there is none."""
+        free = self._apart
+        return free if free is None or self.clock is None else free.at(self.clock)
 
     # loads
 

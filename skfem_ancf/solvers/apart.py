@@ -1,21 +1,58 @@
-"""Motions from one displacement to another, to see that nothing touches on the way.
+"""Equilibria of scenes in which nothing touches.
 
-A straight line in the degrees of freedom would shorten what turns far. Here each node turns by its
-part of the whole, with its slopes, and chords between nodes turn by the mean of both ends.
+Corrections of Newton's method lead far beyond an equilibrium, and to know on the way of each that
+nothing touches takes longer than to find it. A scene is therefore solved without contact first.
+That holds if a motion to the result is known on which nothing touches.
+
+A straight line in the degrees of freedom would shorten what turns far. In the motion each node
+turns by its part of the whole, with its slopes, and chords between nodes by the mean of both ends.
 """
 
+import logging
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..actions.pairs.sweep import swept_apart
 from ..beam.kinematics import tangents
-from ..core import Array
+from ..core import Array, ConvergenceError, Interrupted
 from ..equations.evaluation import motion_is_clear
 from ..equations.system import System
+from .iteration import LoadStepFailed, StaticResult
+
+logger = logging.getLogger(__name__)
 
 #: Largest rotation of a node between two displacements of a motion, in radians, and their number.
-TURN, MOST = 0.7, 40
+TURN, MOST = 1.0, 40
+
+
+def solved_apart(system: System, u: Array, memory: Array | None, t: float,
+                 solve: Callable[[System, Array | None], StaticResult]) -> StaticResult | None:
+    """The result of ``solve`` for the scene without contact and its part of the history, if it is
+    known that nothing touches from u (N,) to there; else None."""
+    if system.apart is None or system.constraints.missing_supports:
+        return None
+    apart, here = system.apart, system.recycled(memory, 0.0)
+    ours, theirs = here.histories, apart.histories
+    try:
+        if not stays_clear(here, t, u):
+            return None
+        result = solve(apart, ours.part(theirs, memory))
+        if not stays_clear(here, t, u, result.u):
+            return None
+        if here.forces.contacts.obstacles:
+            here.forces.contacts.settle(result.u, t)
+        result.memory = ours.joined(theirs, ours.get(), result.memory)
+        return result
+    except Interrupted as stop:
+        stop.state.memory = ours.joined(theirs, memory, stop.state.memory)
+        raise
+    except (LoadStepFailed, ConvergenceError) as failure:
+        logger.debug("without contact: %s", failure)
+        return None
+    finally:
+        here.recycle()
 
 
 def stays_clear(system: System, t: float, *ways: Array) -> bool:
@@ -28,8 +65,7 @@ def stays_clear(system: System, t: float, *ways: Array) -> bool:
         return bool(run(t, motion))
     clear = np.all([swept_apart(search, motion.view(complex)[:, pair.used])
                     for search, pair in zip(forces._searches, forces.pairs)], axis=0)
-    return all(clear[k] or run(t, motion[k:k + 2]) for k in range(len(clear))) and bool(
-        run(t, motion[-1:]))
+    return all(one or run(t, motion[k:k + 2]) for k, one in enumerate(clear))
 
 
 def motion_between(system: System, u0: Array, u1: Array) -> Array | None:

@@ -1,7 +1,6 @@
 """One load increment."""
 
 import logging
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,6 @@ from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, 
 from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
 from . import strategies
-from .apart import stays_clear
 from .iteration import (CONVERGED, DIVERGES, INDEFINITE, ITERATIONS, NOT_CONVERGED, SINGULAR,
                         Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                         StaticResult, TooManyIterations, Unstable, equilibrium)
@@ -89,8 +87,6 @@ class Increment:
         """The equilibrium, a stable one if requested; raises LoadStepFailed."""
         with np.errstate(all="ignore"):  # overflow shows in the residual
             system, start, route = self.system, self.start, self.options.route
-            if (found := self._without_contact(stable)) is not None:
-                return found
             found = self._augmented()
             passed = system.forces.passed((start.u, route.load_and_time(start.load)[1]),
                                           (found.u, self.time))
@@ -104,25 +100,6 @@ class Increment:
                     and not strategies.heads_on(system, start, found.u)):
                 raise Unstable("the equilibrium found lies on the side away from the load", found)
             return found
-
-    def _without_contact(self, stable):
-        """The equilibrium without contact, if it is known that nothing touches on a motion to it;
-        else None. Corrections far beyond it need not be checked for contact."""
-        system, start, options = self.system, self.start, self.options
-        if (not system.forces.paired or options.drag is not None
-                or system.constraints.missing_supports
-                or not stays_clear(system, self.time, start.u)):
-            return None
-        free, memory = system.apart(start.memory)
-        step = Increment(free, replace(start, memory=memory), self.level, options)
-        step.record = self.record
-        try:
-            found = step.solve(stable)
-        except LoadStepFailed:
-            return None
-        finally:
-            step.system.recycle()
-        return found if stays_clear(system, self.time, start.u, found.u) else None
 
     def resting(self) -> Equilibrium | None:
         """The last equilibrium, if only round-off acts there; else None."""

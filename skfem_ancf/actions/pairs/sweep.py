@@ -6,9 +6,9 @@ import numpy as np
 
 from ...core import Array
 
-#: Largest number of parts of a chain; largest turn within which a beam cannot touch itself, of
-#: which a stretch that is nearly straight has more, in radians.
-PARTS, ARC = 48, 1.4
+#: Largest number of parts of a chain; largest turn of a part of a beam that cannot touch itself, in
+#: radians, and its least stretch.
+PARTS, ARC, LEAST = 32, 1.4, 0.85
 
 
 def swept_apart(search: Any, z: Array) -> Array:
@@ -47,4 +47,5 @@ def _in_arc(t, order, first, c, i, j):
     turned[:, 1:][:, faces] = np.abs(np.angle(slope * np.roll(slope, 1, axis=1).conj())) * ~others
     turned = np.cumsum(turned, axis=1)
     turn = turned[:, np.append(first[1:], len(order))[j]] - turned[:, first[i] + 1]
-    return np.all(turn + 2.0 * inner.max(axis=1, initial=0.0)[:, None] < ARC, axis=0)
+    long = np.all(2.0 * np.abs(c[:, 1]) >= LEAST * t.spans[order], axis=1)
+    return np.all((turn + 2.0 * inner.max(axis=1, initial=0.0)[:, None] < ARC) & long[:, None], axis=0)
