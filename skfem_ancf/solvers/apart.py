@@ -61,7 +61,8 @@ def stays_clear(system: System, t: float, *ways: Array) -> bool:
     if motion is None:
         return False
     run, forces = system.backend.of(motion_is_clear), system.forces
-    if len(motion) < 3 or forces.contacts.obstacles:
+    if len(motion) < 3 or not (forces.paired and (
+            not forces.contacts.obstacles or all(map(forces.contacts.untouched, motion)))):
         return bool(run(t, motion))
     clear = np.all([swept_apart(search, motion.view(complex)[:, pair.used])
                     for search, pair in zip(forces._searches, forces.pairs)], axis=0)
