@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.pairs.sweep import swept_apart
 from ..beam.kinematics import tangents
 from ..core import Array, ConvergenceError, Interrupted
 from ..equations.evaluation import motion_is_clear
@@ -36,7 +35,8 @@ def solved_apart(system: System, u: Array, memory: Array | None, t: float,
     apart, here = system.apart, system.recycled(memory, 0.0)
     ours, theirs = here.histories, apart.histories
     try:
-        if not stays_clear(here, t, u):
+        known = here.forces.starts_apart and not (u.any() or here.forces.contacts.obstacles)
+        if not (known or stays_clear(here, t, u)):
             return None
         result = solve(apart, ours.part(theirs, memory))
         if not stays_clear(here, t, u, result.u):
@@ -64,9 +64,7 @@ def stays_clear(system: System, t: float, *ways: Array) -> bool:
     if len(motion) < 3 or not (forces.paired and (
             not forces.contacts.obstacles or all(map(forces.contacts.untouched, motion)))):
         return bool(run(t, motion))
-    clear = np.all([swept_apart(search, motion.view(complex)[:, pair.used])
-                    for search, pair in zip(forces._searches, forces.pairs)], axis=0)
-    return all(one or run(t, motion[k:k + 2]) for k, one in enumerate(clear))
+    return all(far or run(t, motion[k:k + 2]) for k, far in enumerate(forces.stay_apart(motion)))
 
 
 def motion_between(system: System, u0: Array, u1: Array) -> Array | None:
@@ -93,48 +91,50 @@ def motion_between(system: System, u0: Array, u1: Array) -> Array | None:
 
 def _turns(beam: Any, u0: Array, u1: Array) -> list[Array]:
     """Rotations of the nodes of each chain, the least where it moves least."""
-    turn = np.angle(tangents(beam, u1) * tangents(beam, u0).conj())
-    if np.abs(turn).max() < TURN:
-        return [turn]
+    turn = tangents(beam, u1) * tangents(beam, u0).conj()
     moved, out = np.abs((u1 - u0).view(complex)[::beam.nd // 2]), []
-    for nodes in _chains(beam):
-        one = np.unwrap(turn[nodes])
-        out.append(one - 2.0 * np.pi * np.rint(one[np.argmin(moved[nodes])] / (2.0 * np.pi)))
+    for nodes in _chains(beam.mesh):
+        some = turn[nodes]
+        one = np.cumsum(np.angle(np.append(some[:1], some[1:] * some[:-1].conj())))
+        whole = one[moved[nodes].argmin()] / (2.0 * np.pi)
+        out.append(one - 2.0 * np.pi * np.rint(whole))
     return out
 
 
-def _chains(beam):
+def _chains(mesh):
     """The nodes of each chain."""
-    left, right = beam.mesh.t
-    first = np.flatnonzero(np.diff(beam.mesh.chains, prepend=-1))
-    return [np.append(a[0], b) for a, b in zip(np.split(left, first[1:]), np.split(right, first[1:]))]
+    if mesh.is_chain:
+        return [np.arange(mesh.t.shape[1] + 1)]
+    first = np.flatnonzero(np.diff(mesh.chains, prepend=-1))
+    return [np.append(nodes[0, 0], nodes[1]) for nodes in np.split(mesh.t, first[1:], axis=1)]
 
 
 def _turns_of_solid(one, u0, u1):
     """Rotations of a body's director, or of lines between points of a domain."""
     a, b = ((one.q0 + u).view(complex) for u in (u0, u1))
-    if len(a) > 2:
-        a, b = np.diff(a), np.diff(b)
-    return np.angle(b * a.conj())[-1 if len(a) == 2 else 0:]
+    if len(a) == 2:
+        return np.angle(b[1:] * a[1:].conj())
+    return np.angle(np.diff(b) * np.diff(a).conj())
 
 
 def _turn(beam, u0, u1, turns, held, share, out):
     """Set displacements (n, N) of a beam that turns."""
-    k = beam.nd // 2
-    a, b = ((beam.q0 + u).view(complex).reshape(-1, k) for u in (u0, u1))
-    fixed = held.reshape(-1, beam.nd)[:, :2].any(axis=1)
-    for nodes, turn in zip(_chains(beam), turns):
-        def turned(x, y, turn):
-            return np.exp(1j * share * turn) * (x + share * (y * np.exp(-1j * turn) - x))
-
-        z = np.stack([turned(a[nodes, j], b[nodes, j], turn) for j in range(k)], axis=2)
-        x, y = a[nodes, 0], b[nodes, 0]
-        places = np.cumsum(turned(np.diff(x, prepend=0.0), np.diff(y, prepend=0.0), np.append(
-            turn[0], 0.5 * (turn[1:] + turn[:-1]))), axis=1)
-        at = np.flatnonzero(fixed[nodes])
+    a, b = ((beam.q0 + u).view(complex).reshape(-1, beam.nd // 2) for u in (u0, u1))
+    fixed, z = held.reshape(-1, beam.nd)[:, :2].any(axis=1), np.empty((len(share), *a.shape), complex)
+    for nodes, turn in zip(_chains(beam.mesh), turns):
+        x, y = a[nodes], b[nodes]
+        own = z[:, nodes] = _turned(x, y, turn[:, None], share[..., None])
+        own[:, 1:, 0] = own[:, :1, 0] + np.cumsum(_turned(np.diff(x[:, 0]), np.diff(
+            y[:, 0]), 0.5 * (turn[1:] + turn[:-1]), share), axis=1)
+        x, y, at = x[:, 0], y[:, 0], np.flatnonzero(fixed[nodes])
         if not len(at):
-            at = np.array([np.argmin(np.abs(y - x))])
-        lost = x[at] + share * (y - x)[at] - places[:, at]
-        z[:, :, 0] = [way + np.interp(np.arange(len(x)), at, d) for way, d in zip(places, lost)]
-        dofs = (beam.nd * nodes[:, None] + np.arange(beam.nd)).ravel()
-        out[:, dofs] = z.reshape(len(share), -1).view(float) - beam.q0[dofs]
+            at = np.array([np.abs(y - x).argmin()])
+        lost = x[at] + share * (y - x)[at] - own[:, at, 0]
+        z[:, nodes, 0] = [way + np.interp(np.arange(len(x)), at, d)
+                          for way, d in zip(own[..., 0], lost)]
+    out[:] = z.reshape(len(share), -1).view(float) - beam.q0
+
+
+def _turned(x, y, turn, share):
+    """Vectors between x and y that turn evenly."""
+    return np.exp(1j * share * turn) * (x + share * (y * np.exp(-1j * turn) - x))

@@ -16,6 +16,7 @@ from ..forces.base import ForceElement
 from ..places import Vector
 from .facets import ROUND, facets_of, rounded
 from .search import BETWEEN, Search, Surfaces
+from .sweep import Discs
 
 #: Width of the transition from no pressure to proportional pressure, in heights, as of obstacles.
 WIDTH = 1e-3
@@ -131,6 +132,7 @@ class BodyContact(ForceElement):
         self.broad_search = Search(surfaces, sharp, allowed, solids,
                                    (self.penalty, WIDTH, self.friction), places)
         self._surfaces, self.origin = surfaces, origin
+        self.discs = Discs(self.broad_search.tables, allowed)
         self.weights = self.broad_search.weights
         self.near = NEAR * self.broad_search.height
         self._begin(layout)
