@@ -96,6 +96,7 @@ class Rules(NamedTuple):
 
     mixed: bool  # the geometric part uses independent stresses
     iterations: int  # largest number
+    patience: int  # and that once something may have touched
     tol: float
     rough: float  # the same where obstacles or members may touch
     noise: float  # round-off of the size of a correction
@@ -104,13 +105,13 @@ class Rules(NamedTuple):
 
 
 def rules_of(system: Any, method: str, tol: float, most: int, give_up: int = NEVER,
-             rough: float = 0.0) -> Rules:
+             rough: float = 0.0, patience: int | None = None) -> Rules:
     """The :class:`Rules` of a system; ``most`` is the largest number of iterations. ``rough`` is a
-    larger tolerance where something may touch."""
+    larger tolerance where something may touch, ``patience`` the largest number from there on."""
     scales = system.scales
     # the residual has the round-off of all DOFs, the work that of the strains
-    return Rules(method == "mixed", most, tol, rough or tol, 8.0 * scales.work_noise,
-                 8.0 * scales.force_noise, give_up)
+    return Rules(method == "mixed", most, most if patience is None else min(most, patience), tol,
+                 rough or tol, 8.0 * scales.work_noise, 8.0 * scales.force_noise, give_up)
 
 
 @source

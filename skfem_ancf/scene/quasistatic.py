@@ -354,12 +354,12 @@ def _after(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             route, "mixed", rules.tol, rules.max_iterations, close=True), smallest)
     search = partial(Search, system, last.result.u, last.result.memory, rules=rules, stable=stable,
                      progress=False, span=t - last.t)
-    bounded = bool(system.forces.contacts.obstacles or system.forces.changing
-                   or system.constraints.missing_supports)
-    methods = ["mixed", "descent" if bounded else "newton", *(("all",) if smallest else ())]
-    if system.histories.path_dependent:  # what yields needs smaller increments: descents fail
-        methods = [method for method in methods if method != "descent"]
-    for method in methods:
+    bounded = bool(system.forces.contacts.obstacles or system.constraints.missing_supports)
+    for method in ["mixed", "newton", *(("all",) if smallest else ())]:
+        if method == "newton" and bounded:
+            if system.histories.path_dependent:
+                continue  # what yields needs smaller increments: descents fail
+            method = "descent"
         try:
             if method == "all":
                 logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
@@ -373,7 +373,10 @@ def _after(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             else:
                 step = Increment(system, start, 1.0, Options(
                     route, method, rules.tol, rules.max_iterations, method == "mixed", True))
-                result = step.reached(step.solve(stable))
+                try:
+                    result = step.reached(step.solve(stable))
+                finally:
+                    bounded = bounded or step.touched
         except LoadStepFailed as failure:
             failed = failure
             continue

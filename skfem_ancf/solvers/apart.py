@@ -61,8 +61,7 @@ def stays_clear(system: System, t: float, *ways: Array) -> bool:
     if motion is None:
         return False
     run, forces = system.backend.of(motion_is_clear), system.forces
-    if len(motion) < 3 or not (forces.paired and (
-            not forces.contacts.obstacles or all(map(forces.contacts.untouched, motion)))):
+    if len(motion) < 3 or forces.contacts.obstacles:
         return bool(run(t, motion))
     return all(far or run(t, motion[k:k + 2]) for k, far in enumerate(forces.stay_apart(motion)))
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..actions.contact.tables import PASSED
 from ..core import NO_FACTORS, Array, ConvergenceError
 from ..equations import stability
 from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, joint_gap, rules_of
@@ -54,7 +55,7 @@ class Options(NamedTuple):
     If ``watched``, the iteration stops where the mixed method does not seem to converge. ``close``:
     the start is close to the equilibrium. ``drag`` (N,) is a force on each DOF per displacement in
     the increment, and ``guess`` (N,) a first displacement. ``rough`` is a larger tolerance where
-    something may touch."""
+    something may touch, ``patience`` the largest number of iterations once something may have."""
 
     route: Route
     method: str
@@ -65,11 +66,15 @@ class Options(NamedTuple):
     drag: Any = None
     guess: Any = None
     rough: float = 0.0
+    patience: int | None = None
 
 
 class Increment:
     """The step from the last equilibrium to a load level; ``record`` counts all iterations. Its
-    ``system`` is that after the history of the last equilibrium."""
+    ``system`` is that after the history of the last equilibrium. ``touched`` says whether anything
+    may have touched in its iterations."""
+
+    touched = False
 
     def __init__(self, system: System, start: StaticResult, level: float,
                  options: Options) -> None:
@@ -186,14 +191,16 @@ class Increment:
         give_up = BY_THIRD if by_third else (
             BY_SECOND_OR_LATE if options.watched and not solver else NEVER)
         rules = rules_of(system, options.method, options.tol, options.most, give_up,
-                         options.rough)
+                         options.rough, options.patience)
         tables = backend.tables
         target, factors, gap, moved = self._target(tables, u, by)
+        looked = tables.plain.forces.clear[PASSED:PASSED + 1]
         c, g = tables.at(self.time)
         status, record = INDEFINITE, np.empty((2, rules.iterations + 1))
         try:
             while status == INDEFINITE:
                 x, m = np.zeros((ROWS, system.N)), np.zeros((4, len(multipliers)))
+                looked[:] = 0.0
                 x[U], x[GAP], x[MOVED], x[DRAG] = u, gap, moved, 0.0 if drag is None else drag
                 m[0], m[3] = multipliers, c
                 run = backend.of(equilibrium, ITERATIONS, not target.definite)
@@ -205,7 +212,8 @@ class Increment:
         if definite:
             backend.keep_factors()
             by.keep_band()
-        self.record.iterations += n
+        self.touched, self.record.iterations = (
+            self.touched or bool(looked.any()), self.record.iterations + n)
         self.record.force_residuals += record[0, :k].tolist()
         self.record.energy_residuals += record[1, :n].tolist()
         if status != CONVERGED:

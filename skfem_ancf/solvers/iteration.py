@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from ..actions.contact.tables import PASSED
 from ..actions.forces.kernels import nothing_touches, rests
 from ..actions.tables import add_constraint_rate
 from ..core.band import add_multiple, add_to_diagonal, dot, largest, multiply, solve_definite
@@ -180,6 +181,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             return NOT_FINITE, k, k, by_band and k > 0, UNSEEN
         residuals[k] = rho / size if size > 0.0 else 0.0
         clear = clear or nothing_touches(e.forces, u)
+        if not clear:
+            e.forces.clear[PASSED] += 1.0
         used, tol = tol, rules.tol if clear else rules.rough
         if k == 0:
             balanced = is_at_rest(rho, size, joint_gap, tol)
@@ -190,7 +193,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
                                                             rules.force_noise)
         if balanced and not moving:
             return CONVERGED, k + 1, k, by_band and k > 0, examine(e, u, stresses[0])
-        if k == rules.iterations:
+        if k == rules.iterations or k >= rules.patience and touches and (
+                e.forces.clear[PASSED] > 0.0):
             return NOT_CONVERGED, k + 1, k, by_band and k > 0, UNSEEN
         if last:
             balance(e, target, factors, BETWEEN, rules.mixed, g, x, m, stresses, norms)

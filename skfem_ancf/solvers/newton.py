@@ -131,7 +131,7 @@ class Search:
     _furthest: StaticResult | None = None
     _folded: StaticResult | None = None
     _failure: Exception | None = None
-    _spent, _unstabilised, _unstable = 0, 0, False
+    _spent, _unstabilised, _unstable, _touched = 0, 0, False, True
 
     def __init__(self, system: System, u: Array | None, memory: Array | None, rules: Steps,
                  stable: bool, progress: bool | None, span: float = 0.0) -> None:
@@ -214,7 +214,7 @@ class Search:
                 yield METHODS["newton"], partial(self.one_step, "newton")
         # if contacts open and close, a descent needs fewer corrections than load steps; the tangent
         # at rest is singular if only loads stabilise, and springs that push make steps no smaller
-        early = self.stabilised_by_loads or at_once and self.touches or (
+        early = self.stabilised_by_loads or at_once and self.touches and self._touched or (
             self.route.proportional and bool(np.any(
                 system.internal_force(self.route.u, 0.0, 0.0) * system.constraints.mask)))
         if early and self.stable:
@@ -323,7 +323,7 @@ class Search:
         route, result = self.route, self._beginning(self.route)
         options = self._options(route, method, watched=True)
         if self.touches and self.stable:  # a descent follows
-            options = options._replace(most=min(MOST_FROM_SOFT, options.most))
+            options = options._replace(patience=MOST_FROM_SOFT)
         step = Increment(self.system, result, 1.0, options)
         try:
             found = step.solve(self.stable)
@@ -332,6 +332,7 @@ class Search:
             raise
         finally:
             self._spent += step.record.iterations
+            self._touched = step.touched or bool(self.system.forces.contacts.obstacles)
         return step.reached(found)
 
     def descent(self, most: int = strategies.DESCENT, route: Route | None = None) -> StaticResult:

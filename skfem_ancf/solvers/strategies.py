@@ -412,8 +412,7 @@ class ContactSearch:
         options = self.increment.options
         chosen = options._replace(most=min(options.most, most or options.most))
         if rough:
-            chosen = options._replace(rough=max(options.tol, CLOSE), most=min(
-                options.most, MOST_FROM_SOFT))
+            chosen = options._replace(rough=max(options.tol, CLOSE), patience=MOST_FROM_SOFT)
         if begin is None:
             return self.increment.from_start(chosen)
         return self.increment.iterate(begin, chosen)
