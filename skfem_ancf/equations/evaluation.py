@@ -5,7 +5,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ..actions.forces.kernels import (NO_SPAN, add_elastic_force, add_element_tangent,
-                                      contact_along, contact_work, nothing_touches, way_is_clear)
+                                      contact_along, contact_work, looked_free, nothing_touches, rests,
+                                      way_is_clear)
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
@@ -181,7 +182,8 @@ def hold_back(e, t, loose, clear, u, R, du, dm):
     # contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close
     # in turn.
     work, two, scratch = dot(R, du), np.empty(2), np.zeros(u.size)
-    if loose == 0.0 and clear and way_is_clear(e.forces, t, u, du, scratch):
+    if loose == 0.0 and clear and way_is_clear(
+            e.forces, t, e.forces.contacts.number > 0, u, du, scratch):
         return 1
     contact_along(e.forces, t, u, du, two)
     if not work > 0.0 and loose == 0.0:
@@ -217,16 +219,14 @@ def hold_back(e, t, loose, clear, u, R, du, dm):
 
 @source
 def motion_is_clear(e, t, motion):
-    """True if it is known that nothing touches on straight ways between displacements (n, N)."""
-    n, N = motion.shape
-    scratch = np.zeros(N)
+    """True if it is known that members do not touch on straight ways between displacements (n, N).
+    """
+    n, f = motion.shape[0], np.zeros(motion.shape[1])
     for k in range(n):
         u = motion[k]
-        if not nothing_touches(e.forces, u):
-            contact_work(e.forces, t, u, u, scratch)
-            if not nothing_touches(e.forces, u):
-                return False
-        if k + 1 < n and not way_is_clear(e.forces, t, u, motion[k + 1] - u, scratch):
+        if not rests(e.forces, u, 0.0) and not looked_free(e.forces, t, False, u, f):
+            return False
+        if k + 1 < n and not way_is_clear(e.forces, t, False, u, motion[k + 1] - u, f):
             return False
     return True
 

@@ -77,27 +77,22 @@ class Histories:
         return other
 
     def part(self, other: "Histories", history: Array | None) -> Array | None:
-        """The part of a history that is one of the same scene without contact."""
-        return None if history is None else np.append(
-            other.rest, history)[self._places(other)]
+        """The part of a history that is one of the same scene without contact of members."""
+        return None if history is None else history[self._places(other)]
 
     def joined(self, other: "Histories", history: Array | None, part: Array | None) -> Array | None:
         """A history with another part."""
         if not self.values.size:
             return None
-        ours, places = np.array(self.rest if history is None else history), self._places(other)
-        own = places >= other.rest.size
-        ours[places[own] - other.rest.size] = (other.rest if part is None else part)[own]
+        ours = np.array(self.rest if history is None else history)
+        ours[self._places(other)] = other.rest if part is None else part
         return None if (ours == self.rest).all() else ours
 
     def _places(self, other):
-        """Places of the values of a history without contact in its rest, with this one behind."""
-        out, n = np.arange(other.rest.size), other.of_forces.size
-        behind = out.size + np.arange(self.rest.size)
-        turns = other.forces.contacts.turns.size if n else 0  # of springs, the last of obstacles
-        out[n - turns:n] = behind[self.of_forces.size - turns:self.of_forces.size]
+        """Places of the values of a history without contact of members."""
+        out = np.arange(other.rest.size)
         for key, at in other._parts.items():
-            out[at] = behind[self._parts[key]]
+            out[at] = np.arange(self._parts[key].start, self._parts[key].stop)
         return out
 
     def kernel(self, beam: Beam) -> Any:

@@ -35,15 +35,13 @@ def solved_apart(system: System, u: Array, memory: Array | None, t: float,
     apart, here = system.apart, system.recycled(memory, 0.0)
     ours, theirs = here.histories, apart.histories
     try:
-        known = here.forces.starts_apart and not (u.any() or here.forces.contacts.obstacles)
+        known = here.forces.starts_apart and not u.any()
         if not (known or stays_clear(here, t, u)):
             return None
         result = solve(apart, ours.part(theirs, memory))
         if not stays_clear(here, t, u, result.u):
             return None
-        if here.forces.contacts.obstacles:
-            here.forces.contacts.settle(result.u, t)
-        result.memory = ours.joined(theirs, ours.get(), result.memory)
+        result.memory = ours.joined(theirs, memory, result.memory)
         return result
     except Interrupted as stop:
         stop.state.memory = ours.joined(theirs, memory, stop.state.memory)
@@ -61,7 +59,7 @@ def stays_clear(system: System, t: float, *ways: Array) -> bool:
     if motion is None:
         return False
     run, forces = system.backend.of(motion_is_clear), system.forces
-    if len(motion) < 3 or forces.contacts.obstacles:
+    if len(motion) < 3:
         return bool(run(t, motion))
     return all(far or run(t, motion[k:k + 2]) for k, far in enumerate(forces.stay_apart(motion)))
 
