@@ -5,8 +5,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ..actions.forces.kernels import (NO_SPAN, add_elastic_force, add_element_tangent,
-                                      contact_along, contact_work, looked_free, nothing_touches, rests,
-                                      way_is_clear)
+                                      contact_along, contact_work, looked_free, nothing_touches,
+                                      rests, way_is_clear)
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,

@@ -281,6 +281,12 @@ class System:
         free = self._apart
         return free if free is None or self.clock is None else free.at(self.clock)
 
+    @shared
+    def starts_apart(self) -> bool:
+        """True if members do not touch in the reference configuration."""
+        return all(hasattr(e, "least_gap") and e.least_gap(np.zeros((len(at) // 2, 2))) > 0.0
+                   for e, at in self.forces.changing)
+
     # loads
 
     def at(self, t: float) -> "System":

@@ -35,8 +35,7 @@ def solved_apart(system: System, u: Array, memory: Array | None, t: float,
     apart, here = system.apart, system.recycled(memory, 0.0)
     ours, theirs = here.histories, apart.histories
     try:
-        known = here.forces.starts_apart and not u.any()
-        if not (known or stays_clear(here, t, u)):
+        if not (here.starts_apart and not u.any() or stays_clear(here, t, u)):
             return None
         result = solve(apart, ours.part(theirs, memory))
         if not stays_clear(here, t, u, result.u):
@@ -58,10 +57,12 @@ def stays_clear(system: System, t: float, *ways: Array) -> bool:
     motion = motion_between(system, *ways) if len(ways) > 1 else np.array(ways)
     if motion is None:
         return False
-    run, forces = system.backend.of(motion_is_clear), system.forces
+    run = system.backend.of(motion_is_clear)
     if len(motion) < 3:
         return bool(run(t, motion))
-    return all(far or run(t, motion[k:k + 2]) for k, far in enumerate(forces.stay_apart(motion)))
+    far = np.all([e.discs.stay_apart(motion.view(complex)[:, at[::2] // 2])
+                  for e, at in system.forces.changing], axis=0)
+    return all(far[k] or run(t, motion[k:k + 2]) for k in range(len(far)))
 
 
 def motion_between(system: System, u0: Array, u1: Array) -> Array | None:
@@ -117,7 +118,8 @@ def _turns_of_solid(one, u0, u1):
 def _turn(beam, u0, u1, turns, held, share, out):
     """Set displacements (n, N) of a beam that turns."""
     a, b = ((beam.q0 + u).view(complex).reshape(-1, beam.nd // 2) for u in (u0, u1))
-    fixed, z = held.reshape(-1, beam.nd)[:, :2].any(axis=1), np.empty((len(share), *a.shape), complex)
+    fixed = held.reshape(-1, beam.nd)[:, :2].any(axis=1)
+    z = np.empty((len(share), *a.shape), complex)
     for nodes, turn in zip(_chains(beam.mesh), turns):
         x, y = a[nodes], b[nodes]
         own = z[:, nodes] = _turned(x, y, turn[:, None], share[..., None])

@@ -9,7 +9,7 @@ from scipy import sparse
 
 from ...core import Array, constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
-from ..contact.tables import HAS_ENTRIES, MARGIN, SAFE, SEARCHED, SEEN, clear_table, set_clear
+from ..contact.tables import HAS_ENTRIES, SAFE, SEARCHED, SEEN, clear_table, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
 from .base import KernelElement
 from .springs import TorsionalSpring
@@ -53,7 +53,6 @@ class Forces:
     elements = custom = changing = remembering = parts = _springs = _blocks = _slices = masses
     _paired: Any = masses
     rows = size = paired = 0
-    starts_apart = False  # in the reference configuration
     couples_far = resists = False
     symmetric = True
     contacts = Contacts((), 0)
@@ -106,7 +105,6 @@ class Forces:
         if self.changing:
             set_clear(self.clear, u, 0.5 * SAFE * self._least_gap(u))
             self.clear[SEARCHED] = sum(pair.found[1] for pair in self.pairs)
-            self.starts_apart = self.paired > 0 and self.clear[MARGIN] > 0.0
         self.couples_far = bool(len(self.border_rows) or self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
         # those of user-defined laws first, then in the order of the parts
@@ -396,11 +394,6 @@ class Forces:
             if text := element.passed(*(u[at].reshape(-1, 2) for u in (a[0], b[0])), b[1]):
                 return text
         return None
-
-    def stay_apart(self, u: Array) -> Array:
-        """True for ways between displacements (n + 1, N) on which members are far apart, (n,)."""
-        return np.all([e.discs.stay_apart(u.view(complex)[:, at[::2] // 2])
-                       for e, at in self._paired], axis=0)
 
     def moves_far(self, u: Array) -> Array:
         """True for steps between displacements (n + 1, N) that may lead through an element."""

@@ -11,7 +11,8 @@ PARTS, ARC, LEAST = 32, 1.4, 0.85
 
 
 class Discs:
-    """Discs around parts of chains, of several facets each; ``allowed`` (M, M) says which members may touch."""
+    """Discs around parts of chains, of several facets each; ``allowed`` (M, M) says which members
+    may touch."""
 
     def __init__(self, t: PairTables, allowed: Array) -> None:
         order = np.lexsort((t.places, t.chains))
