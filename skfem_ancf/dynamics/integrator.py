@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.contact.tables import HAS_ENTRIES, PASSED
+from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.obstacles.contact import may_touch
 from ..actions.tables import constraint, joint_directions
 from ..core.band import SPARE, Band, BandMatrix, Coupling, coupling, factorize, fix, solve
@@ -257,11 +257,11 @@ class Integrator:
         given = self._functions.of(begun, dt, (first, first + n), self.limit, block)
         lasting = s.histories.lasting
         rows, multipliers = np.empty((n, 4, s.N)), np.empty((n, 2, self.m))
-        memories = np.full((n, 1 + (s.histories.values.size if lasting else 0)), np.nan)
+        memories = np.full((n, 2 + (s.histories.values.size if lasting else 0)), np.nan)
         kernel, data, points = self._begin(y, dt, n, given)
-        done = self._call(kernel, y, dt, (rows, memories[:, 0]), self._rule, data, self._state,
+        done = self._call(kernel, y, dt, (rows, memories[:, :2]), self._rule, data, self._state,
                           self._work, memories, rows, multipliers, points)
-        history = memories[:, 1:] if lasting or y.history is None else np.array([y.history] * done)
+        history = memories[:, 2:] if lasting or y.history is None else np.array([y.history] * done)
         turns = np.empty(0) if y.turns is None else y.turns
         columns = (begun + dt * np.arange(first + 1, first + done + 1), *rows.swapaxes(0, 1),
                    *multipliers.swapaxes(0, 1), np.full(done, dt), memories[:, 0], history,
@@ -297,7 +297,8 @@ class Integrator:
               *args: Any) -> int:
         """Call a compiled function that takes steps; returns how many succeeded."""
         # On Ctrl-C it counts the steps that are complete, and sets ``stopped``. ``out`` has the
-        # displacements, and a number for each step that is NaN until the step is complete.
+        # displacements, and for each step a number that is NaN until it is complete, and 1 if
+        # something may touch in it.
         s, state, before, rows = self.system, self._state, np.array(self._state), out[0]
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
@@ -306,7 +307,6 @@ class Integrator:
             self._nodes or self._couplings))
         try:
             s.histories.put(y.history)
-            s.forces.clear[PASSED] = float(function is not steps)
             with np.errstate(all="ignore"):
                 done = call(self._matrices, *args)
         except BaseException as error:  # the motion may continue from y
@@ -314,26 +314,27 @@ class Integrator:
             self.forget()
             if not isinstance(error, KeyboardInterrupt):
                 raise
-            done, self.stopped = int(np.argmax(np.append(np.isnan(out[1]), True))), True
+            done, self.stopped = int(np.argmax(np.append(np.isnan(out[1][:, 0]), True))), True
         done, self._lost = s.constraints.first_lost(rows[:done, 0])
-        may_pass = done > 0 and s.forces.clear[PASSED] > 0.0
-        if may_pass and s.forces.contacts.sweeps:
+        touches = out[1][:done, 1] > 0.0
+        if touches.any() and s.forces.contacts.sweeps:
             u, v = (np.concatenate([[x], rows[:done, k]]) for k, x in enumerate((y.u, y.v)))
             done, passed = s.forces.contacts.sweep.first(u, v, y.t + dt * np.arange(len(u)))
             if passed:
                 self._lost = f"the step jumps over the obstacle {passed}"
-        if may_pass and done and s.forces.changing:
-            done = self._first_passed(y, rows, done, dt)
+        if touches[:done].any() and s.forces.changing:
+            done = self._first_passed(y, rows, done, dt, touches[:done])
         if done < len(rows):
             self.forget()
         return done
 
-    def _first_passed(self, y, rows, done, dt):
+    def _first_passed(self, y, rows, done, dt, touches):
         """The number of steps before the first one that leads through a body."""
         u, passed = np.concatenate([[y.u], rows[:done, 0]]), self.system.forces.passed
         fast = self.system.forces.moves_far(u)
         fast[-1] = True  # what slow steps lead through stays there
-        texts = (passed(*((u[j], y.t + j * dt) for j in (k, k + 1))) for k in np.flatnonzero(fast))
+        texts = (passed(*((u[j], y.t + j * dt) for j in (k, k + 1)))
+                 for k in np.flatnonzero(fast & touches))
         if any(texts):
             for k in range(done):
                 if text := passed(*((u[j], y.t + j * dt) for j in (k, k + 1))):

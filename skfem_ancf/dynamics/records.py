@@ -305,6 +305,7 @@ class StepState(NamedTuple):
     last_correction: F1  # the one before
     dissipated: F1  # work of damping
     mixed_steps: I1  # remaining steps of the mixed iteration
+    guess: I1  # 1 while margins alone say that members do not touch
 
 
 # named tuples of collocation: coefficients, prescribed functions, work arrays

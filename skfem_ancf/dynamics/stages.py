@@ -234,7 +234,7 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
                     s.factors, (k + 1) * (method.points.size + 1) - 1))
             settle(e, (t, t), 0.0, w.before[0], w.y[0], w.y[1], taken)
             state.dissipated[0] += taken[0]
-            copy(e.history, memories[k, 1:])
+            copy(e.history, memories[k, 2:])
         state.last_dt[0], state.mixed_steps[0] = s.h, max(0, state.mixed_steps[0] - 1)
         for j in range(4):
             copy(w.y[min(j, 2)], rows[k, j])
@@ -244,6 +244,7 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
             copy(w.l[j], points[k, j, e.free.size:])
         for j in range(2):
             copy(w.shares, multiplier_rows[k, j])
+        memories[k, 1] = 1.0  # what points lead through
         memories[k, 0] = state.dissipated[0]  # last: the step is complete
     return rows.shape[0]
 
@@ -373,7 +374,7 @@ def _balance(e, matrices, s, w, at):
     copy(constrained[2], a)
     multiply(matrices.M, a, scratch)
     body_force(e.body, u, f)
-    add_elastic_force(e.forces, t, 0.0, u, u, f)
+    add_elastic_force(e.forces, t, 0.0, u, u, 0, f)
     external_force(e.loads, row_of(s.factors, at), t, 1.0, u, Q)
     for i in indices(a.size):
         a[i] += (Q[i] - f[i] - scratch[i]) * e.free[i]
@@ -487,7 +488,7 @@ def _residual(e, matrices, method, s, w, state, step, k):
     u, v, f, Q, d, scratch = w.U[k], w.V[k], w.R[k], w.x[0], w.x[1], w.x[2]
     at = step * (method.points.size + 1) + k
     t, e.span[0] = s.times[at], s.h * method.points[k]
-    add_elastic_force(e.forces, t, 0.0, u, u, f)
+    add_elastic_force(e.forces, t, 0.0, u, u, 0, f)
     if matrices.dampers.active > 0:
         damping_force(e, matrices.dampers, matrices.M, t, u, v, state.mixed_steps[0], d, scratch)
         for i in indices(f.size):

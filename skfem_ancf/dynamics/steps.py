@@ -17,8 +17,8 @@ import numpy as np
 
 from ..actions.contact.tables import PRESSURES
 from ..actions.forces.kernels import (add_contact_tangent, add_elastic_force, add_friction_tangent,
-                                      augment_contact, count_passed, element_stiffness,
-                                      keep_entries, put_far_stiffness, set_contact_rate)
+                                      augment_contact, element_stiffness, keep_entries, may_pass,
+                                      put_far_stiffness, rests_by_margin, set_contact_rate)
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_curvature_force, add_joint_force,
                               add_load_stiffness, add_products, carry_eigenstrains, constraint,
                               joint_directions, mean_external_force)
@@ -100,9 +100,9 @@ def internal_force(e, matrices, rule, s, w, state):
     else:
         body_force(e.body, u, f)
     if rule.conserving > 0:
-        add_elastic_force(e.forces, s.t_force, s.dt, u0, u, f)
+        add_elastic_force(e.forces, s.t_force, s.dt, u0, u, state.guess[0], f)
     else:
-        add_elastic_force(e.forces, s.t_force, 0.0, u, u, f)
+        add_elastic_force(e.forces, s.t_force, 0.0, u, u, state.guess[0], f)
     if matrices.dampers.active > 0:  # materials are included already in the mixed iteration
         d = w.x.damping
         damping_force(e, matrices.dampers, matrices.M, s.t_force, w.x.middle, w.x.damping_velocity,
@@ -197,7 +197,7 @@ def tangent(e, matrices, rule, s, w, state):
         add_products(A, forces.band_at, forces.band_weight, D, forces.band_of)
         put_far_stiffness(forces, D, s.stiffness_factor, dampers.modes.shape[0], matrices.rows.S)
     u, u0 = w.x.u, w.y[0] if conserving else w.x.u
-    keep_entries(forces, s.t_force, s.stiffness_factor, u0, u)
+    keep_entries(forces, s.t_force, s.stiffness_factor, u0, u, state.guess[0])
     if forces.contacts.number > 0:
         add_contact_tangent(forces, s.t_force, s.dt if conserving else 0.0, u0, u, matrices.A)
         if dampers.elements > 0:
@@ -350,8 +350,8 @@ def add_work(e, matrices, rule, s, w, state):
 @source
 def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _):
     """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded."""
-    # Written for each step: work of damping and history, (n, 1 + k); u, v, a and w, (n, 4, N);
-    # multipliers at the end and where they were evaluated, (n, 2, m).
+    # Written for each step: work of damping, 1 if something may touch and history, (n, 2 + k); u,
+    # v, a and w, (n, 4, N); multipliers at the end and where they were evaluated, (n, 2, m).
     contacts, taken, w0, w1 = e.forces.contacts, np.empty(1), w.y[3], w.x.du
     for n in range(rows.shape[0]):
         s = step_of(e.joints, rule, data, n)
@@ -368,9 +368,9 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
             settle(e, (s.t_force, s.t), s.dt if rule.conserving > 0 else 0.0, w.y[0], w.x.u, w.x.v,
                    taken)
             state.dissipated[0] += taken[0]
-            copy(e.history, memories[n, 1:])
-        if contacts.number > 0 or e.forces.changing > 0:
-            count_passed(e.forces, w.y[0], w.x.u)
+            copy(e.history, memories[n, 2:])
+        touches = contacts.number > 0 or e.forces.changing > 0
+        memories[n, 1] = 1.0 if touches and may_pass(e.forces, w.y[0], w.x.u) else 0.0
         # the end of the step becomes the start of the next
         copy(w.x.u, w.y[0])
         copy(w.x.v, w.y[1])
@@ -400,6 +400,7 @@ def _iterate(e, matrices, rule, s, w, state):
             carry_eigenstrains(e.loads, s.ends)
         if contacts.lasting > 0:
             set_contact_rate(e.forces, s.dt)
+    state.guess[0] = 1 if e.forces.paired > 0 else 0
     while left > 0:
         left, most = left - 1, most - 1
         if state.factors[0] == 0:
@@ -427,6 +428,8 @@ def _iterate(e, matrices, rule, s, w, state):
             augment_contact(e.forces, s.t, w.x.u, taken)
             if taken[0] > 0.0:
                 status, left, state.correction[0] = GO_ON, min(ITERATIONS, most), -1.0
+        if status == DONE and state.guess[0] > 0 and rests_by_margin(e.forces, w.x.u):
+            status, state.guess[0] = GO_ON, 0
         if status == RESTART:
             _start(e, matrices, rule, s, w, state)
         elif status != GO_ON:

@@ -20,14 +20,14 @@ from .tables import Equations
 def force(e, u, at, f):
     """Set the internal force f at u; ``at`` is the time, or the load factor in statics."""
     body_force(e.body, u, f)
-    add_elastic_force(e.forces, at, 0.0, u, u, f)
+    add_elastic_force(e.forces, at, 0.0, u, u, 0, f)
 
 
 @source
 def mean_force(e, u0, u1, at, f):
     """Set the mean of the internal force, with exact work from u0 to u1."""
     body_mean(e.body, u0, u1, f)
-    add_elastic_force(e.forces, at, NO_SPAN, u0, u1, f)
+    add_elastic_force(e.forces, at, NO_SPAN, u0, u1, 0, f)
 
 
 @source
@@ -42,7 +42,7 @@ def tangent(e, u, factors, t, scale, at, use_independent, stresses, independent,
     # The geometric part uses the independent stresses if ``use_independent``. ``factors``, ``t``
     # and ``scale`` are as for :func:`~skfem_ancf.actions.tables.external_force`.
     body_tangent(e.body, u, f, independent, use_independent, stresses, e.K)
-    add_elastic_force(e.forces, at, 0.0, u, u, f)
+    add_elastic_force(e.forces, at, 0.0, u, u, 0, f)
     add_load_stiffness(e.loads, factors, t, scale, u, e.K)
     add_element_tangent(e.forces, at, u, e.K)
 

@@ -189,7 +189,7 @@ class StrainTangent:
     def _element_force(self):
         system, force = self.system, np.zeros(self.system.N)
         u = np.array(self._at[0], dtype=float)
-        add_elastic_force(system.backend.tables.plain.forces, self._at[3], 0.0, u, u, force)
+        add_elastic_force(system.backend.tables.plain.forces, self._at[3], 0.0, u, u, 0, force)
         return force[self.free]
 
     def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:

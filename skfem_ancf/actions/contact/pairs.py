@@ -19,7 +19,7 @@ from ...core import (C1, C2, C3, F1, F2, I1, I2, MADE, apart, everywhere, indice
 from ...core.band import copy, dot as inner, farthest, largest, smallest
 from ...core.callbacks import SEARCHES, call_custom, owner
 from ..tables import least_each
-from .stretches import Cut, Rows, straight
+from .stretches import Cut, Rows, cut_anew, straight_within
 from .points import (Touch, add_bend, add_coupling, add_resistance, by_slope, cross, dot,
                      mean_pressure, product, put, respond, return_mapping, scaled, size, spread,
                      turned, vector)
@@ -41,6 +41,8 @@ SAME = 0.8
 MEANS, CLOSE = 8, 1e-9
 #: The gap where nothing is.
 NOTHING = 1e300
+#: Distance in heights for which a list of candidates is enough, and the largest one.
+SKIN, FARTHEST = 0.5, 1e6
 #: Components of the vectors r, t, c, T of a contact point.
 COMPONENTS = 8
 
@@ -52,7 +54,24 @@ class Candidates(NamedTuple):
     e: I1
     zeta: F1
     group: I1  # numbers of pairs of a point and a chain
-    cut: Cut  # none of these are in one stretch
+
+
+class Seeds(NamedTuple):
+    """Places of facets, as ``starts + sum(weights * z[dofs])``, (S,)."""
+
+    e: I1
+    dofs: I2  # (B, S)
+    weights: C2
+    starts: C1
+
+
+class Groups(NamedTuple):
+    """Facets of members, or of parts of a beam; which of these may touch."""
+
+    of: I1  # groups of facets, (F,)
+    members: I1  # of groups
+    elements: I1  # of facets of beams that may touch themselves, else -1, (F,)
+    allowed: I2  # 1 for members that may touch
 
 
 class Facing(NamedTuple):
@@ -84,6 +103,7 @@ class PairTables(NamedTuple):
     stiffness: F1
     reach: F2  # the least and largest zeta of closest points, (2, F)
     near: F1  # distance of a point of a facet from the guess for it
+    widest: float  # the largest one
     members: I1
     chains: I1
     curves: I1
@@ -99,11 +119,14 @@ class PairTables(NamedTuple):
     width: float  # of the transition from no pressure to proportional pressure
     friction: float
     handle: int  # of the search
-    found: I1  # address of the Candidates, and the number of searches, (2,)
+    found: I1  # address of the Candidates, number of searches, 1 if there are Candidates, (3,)
     seen: C1  # displacements at the last search, (n,)
     moves: F2  # their weights, see :func:`~skfem_ancf.actions.contact.tables.weights_of_motion`
     skin: F1  # the candidates are complete until points or facets have moved by half of it, (1,)
+    seeds: Seeds
+    groups: Groups
     rows: Rows  # and while stretches of the beams are straight
+    cut: Cut
     start: Facing  # at the start of the last step, with the displacements there
     start_at: C1
     history: F1  # factor on the stiffness, less 1; with friction curves and anchors of points
@@ -202,11 +225,15 @@ def look(t, z, found):
         found.e[p], found.zeta[p], found.gap[p] = -1, 0.0, 0.0
     u, none = z.view(np.float64), t.sides[:0]
     travel = farthest(t.moves, u, t.seen.view(np.float64))
-    if not travel < 0.5 * t.skin[0] or not straight(t.rows, candidates_of(t).cut, z):
-        call_custom(SEARCHES, t.handle, np.int64(0), 0.0, 0.0, u, none, none)
+    if not travel < 0.5 * t.skin[0] or not straight_within(t.rows, t.cut, z) > 0.0:
         travel = 0.0
+        _group(t, z)
+        t.skin[0], t.found[1], t.found[2] = _room(t, x, z), t.found[1] + 1, 0
+        copy(u, t.seen.view(np.float64))
+        if not t.skin[0] > SKIN * t.height:
+            call_custom(SEARCHES, t.handle, np.int64(0), 0.0, 0.0, u, none, none)
     known = candidates_of(t)
-    far = np.empty(known.p.size)
+    far = np.empty(known.p.size if t.found[2] > 0 else 0)
     for i in indices(far.size):
         p, e = known.p[i], known.e[i]
         c, T, _ = along(curve, e, known.zeta[i])
@@ -221,6 +248,62 @@ def look(t, z, found):
     near = np.nonzero(far > 0.5 * NOTHING)[0]
     if near.size > 0:
         _face(t, known, near, found)
+
+
+@source
+def _group(t, z):
+    """Set groups of facets at displacements z."""
+    n = t.cut.fits.size
+    if t.rows.starts.size > 0:
+        cut_anew(t.rows, t.cut, z)
+    for e in indices(t.sides.size):
+        at = t.groups.elements[e]
+        t.groups.of[e] = where(at < 0, n + t.members[e], t.cut.parts[at])
+        t.groups.members[t.groups.of[e]] = t.members[e]
+
+
+@source
+def may_touch(t, i, j):
+    """True for groups that may touch: of two members, or parts of a beam not in one stretch."""
+    n, s = t.cut.fits.size, np.minimum(i, j)
+    beams = np.maximum(i, j) < n
+    s = where(beams, s, 1)
+    one = (t.cut.fits[s] > 0.0) | ((i == j) & (t.cut.fits[s - 1] > 0.0))
+    return (t.groups.allowed[t.groups.members[i], t.groups.members[j]] > 0) & ~(
+        beams & (np.abs(i - j) < 2) & one)
+
+
+@source
+def _room(t, x, z):
+    """The largest skin within which boxes around groups say that there is nothing."""
+    y, G = t.seeds.starts.copy(), t.groups.members.size
+    for b in range(t.seeds.dofs.shape[0]):
+        for k in indices(y.size):
+            y[k] += t.seeds.weights[b, k] * z[t.seeds.dofs[b, k]]
+    a, c = _boxes(t.groups.of, t.of, x, G), _boxes(t.groups.of, t.seeds.e, y, G)
+    least, some, others = FARTHEST * t.height, np.nonzero(a[0] < NOTHING)[0], np.nonzero(
+        c[0] < NOTHING)[0]
+    apart = np.empty(others.size)
+    for i in some:
+        for k in indices(apart.size):
+            j = others[k]
+            wide = np.maximum(0.0, np.maximum(a[0, i] + c[2, j], c[0, j] + a[2, i]))
+            high = np.maximum(0.0, np.maximum(a[1, i] + c[3, j], c[1, j] + a[3, i]))
+            apart[k] = where(may_touch(t, i, j), np.sqrt(wide * wide + high * high), NOTHING)
+        least = min(least, smallest(apart))
+    return least - t.widest - t.height
+
+
+@source
+def _boxes(groups, e, x, G):
+    """The least x, y, -x, -y of places x of facets e by group, (4, G)."""
+    out, of, sides = np.full((4, G), NOTHING), np.empty(e.size, np.int64), np.empty((4, e.size))
+    for k in indices(e.size):
+        of[k], sides[0, k], sides[1, k] = groups[e[k]], x[k].real, x[k].imag
+        sides[2, k], sides[3, k] = -x[k].real, -x[k].imag
+    for k in range(4):
+        least_each(out[k], of, sides[k])
+    return out
 
 
 @source

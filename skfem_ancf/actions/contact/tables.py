@@ -125,26 +125,32 @@ SAFE = 0.9
 @source
 def is_clear(clear, u, less):
     """True if nothing can touch at u (N,), with a margin that is smaller by ``less``."""
-    return clear.size > 0 and clear[MARGIN] > 0.0 and motion(clear, u) < clear[MARGIN] - less
+    return clear.size > 0 and clear[MARGIN] > 0.0 and moved(clear, u) < clear[MARGIN] - less
 
 
 @source
-def motion(clear, u):
-    """How far points have moved to u (N,) since surfaces were looked at, at most."""
+def motion(clear, u, seen):
+    """How far points have moved from displacements to u (N,), at most."""
     n = u.size
-    return farthest(shaped(clear[SEEN + n:], (2, n // 2)), u, clear[SEEN:SEEN + n])
+    return farthest(shaped(clear[SEEN + n:], (2, n // 2)), u, seen)
+
+
+@source
+def moved(clear, u):
+    """How far points have moved to u (N,) since surfaces were looked at, at most."""
+    return motion(clear, u, clear[SEEN:SEEN + u.size])
 
 
 @source
 def left_of(clear, u):
     """What is left of the margin at u (N,)."""
-    return clear[MARGIN] - motion(clear, u) if clear.size > 0 else 0.0
+    return clear[MARGIN] - moved(clear, u) if clear.size > 0 else 0.0
 
 
 @source
 def share_of(clear, u):
     """The part of the way to u (N,) from where surfaces were looked at that the margin allows."""
-    return SAFE * min(1.0, clear[MARGIN] / max(motion(clear, u), TINY))
+    return SAFE * min(1.0, clear[MARGIN] / max(moved(clear, u), TINY))
 
 
 @source

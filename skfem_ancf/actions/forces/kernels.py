@@ -8,17 +8,18 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ...core.band import clear, copy, dot, largest
+from ...core.band import clear, copy, dot
 from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import ELEMENTS, POSES, call_custom
 from ...core import F1, F2, I1, MADE, apart, indices, shaped, source
 from ..tables import add_each, add_products
 from ..contact.kernels import FAR, of_contacts, untouched
-from ..contact.pairs import candidates_of, pair_accept, pair_force, pair_tables
-from ..contact.stretches import straight
-from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, PASSED, RATE,
-                              SAFE, SEARCHED, SETTLE, TANGENT, TURNS, ContactTables, Request,
-                              RESISTING as RUBBING, is_clear, left_of, set_clear, share_of)
+from ..contact.pairs import pair_accept, pair_force, pair_tables
+from ..contact.stretches import straight_within
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SAFE,
+                              SEARCHED, SETTLE, TANGENT, TURNS, ContactTables, Request,
+                              RESISTING as RUBBING, is_clear, left_of, motion, set_clear,
+                              share_of)
 
 #: Kinds of elements.
 KINDS = 4
@@ -49,6 +50,15 @@ class Kinds(NamedTuple):
     turns: F1
 
 
+class Rested(NamedTuple):
+    """The last two displacements at which changing elements were known to rest, how far points may
+    move from each, and which one was asked for last: 0 or 1."""
+
+    at: F2  # (2, N)
+    within: F1
+    last: I1
+
+
 class ForceTables(NamedTuple):
     """The force elements of a scene.
 
@@ -60,8 +70,7 @@ class ForceTables(NamedTuple):
     change their pattern; ``clear`` says where they do nothing, see
     :func:`~skfem_ancf.actions.contact.tables.is_clear`. ``paired`` of these are contact of members,
     with ``pairs``: their :class:`~skfem_ancf.actions.contact.pairs.PairTables`, or the addresses of
-    these in compiled code. ``rested`` are the last two displacements at which they were known to
-    rest, within the margin of ``clear``.
+    these in compiled code.
     """
 
     start: F1
@@ -83,7 +92,7 @@ class ForceTables(NamedTuple):
     clear: F1
     paired: int
     pairs: I1
-    rested: F2
+    rested: Rested
 
 
 @source
@@ -152,43 +161,54 @@ def _add_force(tables, what, t, span, u, v, start, f):
 
 
 @source
-def at_rest(tables, u0, u1):
-    """True if no changing element does anything at both displacements."""
+def at_rest(tables, u0, u1, guess):
+    """True if no changing element does anything at both displacements. Sections of a ``guess`` may
+    be turned so far that no stretch is known to be straight: margins alone are asked."""
+    if guess > 0:
+        return is_clear(tables.clear, u0, 0.0) and is_clear(tables.clear, u1, 0.0)
     return rests(tables, u0, 0.0) and rests(tables, u1, 0.0)
+
+
+@source
+def rests_by_margin(tables, u):
+    """True if only a margin says that no changing element does anything at u."""
+    return is_clear(tables.clear, u, 0.0) and not rests(tables, u, 0.0)
 
 
 @source
 def rests(tables, u, less):
     """True if it is known that no changing element does anything at u, with a margin that is
     smaller by ``less``."""
-    old, new = tables.rested[0], tables.rested[1]
-    if less == 0.0 and (largest(u - new) <= 0.0 or largest(u - old) <= 0.0):
-        return True  # it is asked several times in an iteration
+    rested, last = tables.rested, tables.rested.last[0]
+    for k in (last, 1 - last):  # it is asked several times in an iteration
+        room = rested.within[k] - max(less, 0.0)
+        if room >= 0.0 and motion(tables.clear, u, rested.at[k]) <= room:
+            rested.last[0] = k
+            return True
     if not is_clear(tables.clear, u, less):
         return False
-    searches = 0.0
+    searches, straight, left = 0.0, FAR, left_of(tables.clear, u)
     for k in range(tables.paired):
         pair = pair_tables(tables, k)
         searches += pair.found[1]
-        if pair.rows.starts.size > 0 and not straight(
-                pair.rows, candidates_of(pair).cut, _used(pair, u)):
-            return False
-    if searches != tables.clear[SEARCHED]:
-        return False  # the margin is that of pairs not in one stretch
-    if less == 0.0:
-        copy(new, old)
-        copy(u, new)
+        straight = min(straight, straight_within(pair.rows, pair.cut, _used(pair, u)))
+    # the margin is that of pairs not in one stretch
+    if not straight > 0.0 or searches != tables.clear[SEARCHED]:
+        return False
+    if left > 0.0:
+        copy(u, rested.at[1 - last])
+        rested.within[1 - last], rested.last[0] = min(straight, left), 1 - last
     return True
 
 
 @source
-def add_elastic_force(tables, t, span, u0, u1, f):
+def add_elastic_force(tables, t, span, u0, u1, guess, f):
     """Add the mean force at zero velocity with exact work from u0 to u1."""
-    # It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
+    # It is a mean over a time span about t; the force at t for u0 = u1 and span zero. ``guess`` is
+    # that of :func:`at_rest`.
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
-    if tables.paired > 0 and not (rests(tables, u1, 0.0) and (
-            span == 0.0 or rests(tables, u0, 0.0))):
+    if tables.paired > 0 and not at_rest(tables, u1 if span == 0.0 else u0, u1, guess):
         _add_pairs(tables, span, u0, u1, f)
     _ask(tables, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
@@ -207,11 +227,7 @@ def _add_pairs(tables, span, u0, u1, f):
         tables.clear[SEARCHED] += pair.found[1]
         add_each(total, pair.used, out)
     set_clear(tables.clear, u1, 0.5 * SAFE * least)
-    old, new = tables.rested[0], tables.rested[1]
-    copy(u1, new)
-    old[0] = np.nan  # of another margin: no displacement equals NaN
-    if not least > 0.0:
-        new[0] = np.nan
+    tables.rested.within[0] = tables.rested.within[1] = -1.0  # of another margin
 
 
 @source
@@ -278,10 +294,9 @@ def _is_free(tables, walls, u):
 
 
 @source
-def count_passed(tables, u0, u1):
-    """Count a step on whose way something may touch."""
-    if not (nothing_touches(tables, u0) and nothing_touches(tables, u1)):
-        tables.clear[PASSED] += 1.0
+def may_pass(tables, u0, u1):
+    """True if something may touch in a step."""
+    return not (nothing_touches(tables, u0) and nothing_touches(tables, u1))
 
 
 @source
@@ -376,7 +391,7 @@ def settle_elements(tables, t, u0, u1, v, out):
         call_custom(ELEMENTS, tables.custom, np.int64(SETTLED), t, 0.0, y, w, out)
     for k in range(tables.paired):
         pair = pair_tables(tables, k)
-        if pair.friction > 0.0 and not at_rest(tables, u0, u1):
+        if pair.friction > 0.0 and not at_rest(tables, u0, u1, 0):
             out[0] += pair_accept(pair, _used(pair, u0), _used(pair, u1), pair.history)
 
 
@@ -420,9 +435,10 @@ def add_element_damping(tables, t, u, v, A):
 
 
 @source
-def keep_entries(tables, t, factor, u0, u1):
+def keep_entries(tables, t, factor, u0, u1, guess):
     """Keep the derivatives of changing elements, times a factor, beside the band of a step."""
-    if tables.changing > 0 and (tables.clear[HAS_ENTRIES] > 0.0 or not at_rest(tables, u0, u1)):
+    if tables.changing > 0 and (tables.clear[HAS_ENTRIES] > 0.0 or not at_rest(
+            tables, u0, u1, guess)):
         call_custom(ELEMENTS, tables.custom, np.int64(ENTRIES), t, factor, u0, u1, u0)
 
 

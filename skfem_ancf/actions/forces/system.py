@@ -15,8 +15,8 @@ from .base import KernelElement
 from .springs import TorsionalSpring
 from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
-                      RESISTING, SETTLED, TORSION, TURNED, ForceTables, element_stiffness, kinds_of,
-                      of_kinds, potential, rests, vectors_of)
+                      RESISTING, SETTLED, TORSION, TURNED, ForceTables, Rested, element_stiffness,
+                      kinds_of, of_kinds, potential, rests, vectors_of)
 
 
 #: Relative size of forces of an item that are round-off.
@@ -65,7 +65,7 @@ class Forces:
                  places: Array | None = None) -> None:
         self._N, self._bandwidth, self.border_rows = N, bandwidth, np.zeros((0, N))
         if not elements:
-            self.clear, self.rested = np.zeros(SEEN + 2 * N), np.full((2, N), np.nan)
+            self.clear, self.rested = np.zeros(SEEN + 2 * N), nowhere(N)
             return
         self.masses = [e for e in elements if e.mass_entries() is not None]
         self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
@@ -101,7 +101,7 @@ class Forces:
                 at = dofs[::2] // 2
                 weights[:, at] = np.maximum(weights[:, at], element.weights)
         self._pair()
-        self.clear, self.rested, u = clear_table(weights), np.full((2, N), np.nan), np.zeros(N)
+        self.clear, self.rested, u = clear_table(weights), nowhere(N), np.zeros(N)
         if self.changing:
             set_clear(self.clear, u, 0.5 * SAFE * self._least_gap(u))
             self.clear[SEARCHED] = sum(pair.found[1] for pair in self.pairs)
@@ -186,7 +186,7 @@ class Forces:
         other.remembering, other.custom = new, [of.get(id(e), e) for e in self.custom]
         other.changing = [(of.get(id(e), e), at) for e, at in self.changing]
         other._pair(fresh=True)
-        other.clear, other.rested = self.clear.copy(), self.rested.copy()
+        other.clear, other.rested = self.clear.copy(), Rested(*(x.copy() for x in self.rested))
         if memory.size:
             other.contacts = self.contacts.after(memory)
         return other
@@ -458,7 +458,14 @@ class Forces:
 
 
 _X, _I = np.zeros(0), np.zeros(0, np.int64)
+
+
+def nowhere(N: int) -> Rested:
+    """No displacement at which anything is known."""
+    return Rested(np.zeros((2, N)), -np.ones(2), np.zeros(1, np.int64))
+
+
 #: For scenes without force elements.
 NO_FORCES = constant(ForceTables(
     _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS, 0,
-    _X, 0, _I, _X.reshape(2, 0)))
+    _X, 0, _I, nowhere(0)))

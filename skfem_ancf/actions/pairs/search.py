@@ -9,21 +9,22 @@ import numpy as np
 import scipy
 
 from ...core import Array, Packed, handle_of
-from ..contact.pairs import APART, EDGE, ON, Candidates, PairTables, facing, together
+from ..contact.pairs import (APART, EDGE, ON, SKIN, Candidates, Groups, PairTables, Seeds, facing,
+                             may_touch, together)
 from ..contact.points import cross, dot
+from ..contact.stretches import Cut
 from ..contact.tables import weights_of_motion
 from .facets import Facets
-from .stretches import NOTHING, Stretches
+from .stretches import stretches_of
 
-#: Distance of seeds along facets, largest number on a facet, and the distance for which a list of
-#: candidates is enough, in heights; larger ones tried where nothing is near, and the largest.
-SEEDS, MOST, SKIN = 1.2, 10, 0.5
-SKINS, FARTHEST = (2.0, 5.0, 12.0, 30.0, 75.0), 1e6
+#: Distance of seeds along facets, largest number on a facet; distances in heights for which a list
+#: of candidates is enough that are tried where nothing is near.
+SEEDS, MOST, SKINS = 1.2, 10, (2.0, 5.0, 12.0, 30.0, 75.0)
 #: Distance of axes that are joined, in heights; parts of an element in which they are searched.
 JOINED, FINE = 1e-3, 8
 #: No candidates.
 _NONE = np.zeros(0, np.int64)
-NOBODY = Candidates(_NONE, _NONE, np.zeros(0), _NONE, NOTHING)
+NOBODY = Candidates(_NONE, _NONE, np.zeros(0), _NONE)
 #: Sine of the angle of parallel segments.
 PARALLEL = 1e-6
 #: How much further points between those of a rule may move.
@@ -97,10 +98,13 @@ class Search:
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
         e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(
             (2.0 * np.arange(m) + 1.0) / m - 1.0, len(f.sides))
-        self._seeds = e, zeta, surfaces.curve(e, zeta, 0), f.dofs[e]
+        weights, at = surfaces.curve(e, zeta, 0)
+        self._seeds = zeta, Seeds(_packed(e, np.int64), _packed(f.dofs[e].T, np.int64),
+                                  _packed(weights.T, complex), _packed(at, complex))
         self._near = 0.6 * f.lengths / m + f.offsets
         self.joined = self._joined(solids)
-        self._stretches = Stretches(sharp, np.diag(allowed), f)
+        elements, rows = stretches_of(sharp, np.diag(allowed), f, self.weights, places)
+        parts = 2 + 2 * len(rows.chains)
         penalty, width, friction = numbers
         of_facets = {name: _packed(getattr(f, name), kind) for kind, names in (
             (float, "sides offsets places lengths spans heights stiffness zeta areas"),
@@ -110,17 +114,22 @@ class Search:
         self.tables = PairTables(
             used=np.arange(n), dofs=_packed(f.dofs.T, np.int64),
             weights=_packed(f.weights.transpose(1, 2, 0), complex),
-            starts=_packed(f.starts.T, complex), near=self._near, reach=_packed(
+            starts=_packed(f.starts.T, complex), near=self._near,
+            widest=float(np.max(self._near)), reach=_packed(
                 f.ends.clip(-1.0, 1.0).T * (1.0 + np.where(np.abs(f.ends) == 1.0, EDGE, ON).T),
                 float),
             joined=_packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
             point_dofs=_packed(surfaces.dofs.T, np.int64), N=_packed(N.T, complex),
             D=_packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
-            found=np.zeros(2, np.int64), seen=np.zeros(n, complex), moves=self.weights,
-            skin=np.zeros(1), rows=self._stretches.rows, start=facing(0, 0, 0),
+            found=np.zeros(3, np.int64), seen=np.zeros(n, complex), moves=self.weights,
+            skin=np.zeros(1), seeds=self._seeds[1], groups=Groups(
+                np.zeros(len(f.sides), np.int64), np.zeros(parts + len(allowed), np.int64),
+                _packed(elements, np.int64), allowed.astype(np.int64)), rows=rows,
+            cut=Cut(np.zeros(max(len(rows.chains), 1), np.int64), np.ones(1, np.int64),
+                    np.zeros((2, parts), np.int64), np.zeros(parts)), start=facing(0, 0, 0),
             start_at=np.zeros(0, complex), history=np.zeros(1), **of_facets)
+        self.candidates = NOBODY
         self.fresh(False)
-        self.search(np.zeros(n, complex))
 
     def fresh(self, other: bool = True) -> "Search":
         """Search anew, or make a copy that does so."""
@@ -128,61 +137,39 @@ class Search:
         one.tables = t._replace(
             handle=handle_of(one), found=t.found.copy(), seen=np.zeros(n, complex),
             skin=np.zeros(1), start=facing(t.starts.shape[0], t.starts.shape[1], len(t.of)),
-            start_at=np.full(n, np.nan + 0j))
+            start_at=np.full(n, np.nan + 0j),
+            groups=t.groups._replace(of=t.groups.of.copy(), members=t.groups.members.copy()),
+            cut=Cut(*(x.copy() for x in t.cut)))
+        one.keep(one.candidates)
         return one
 
+    def keep(self, candidates: Candidates) -> None:
+        """Let the tables have these candidates."""
+        self.candidates, self._words = candidates, Packed(candidates)
+        self.tables.found[0], self.tables.found[2] = self._words.address, 1
+
     def search(self, z: Array) -> None:
-        """Find the :class:`Candidates` at displacements z; the callback of kernels."""
-        x, (e, zeta, curve, dofs) = self.surfaces.outside(z)[0], self._seeds
-        y = displaced(curve, dofs, z)
-        cut = self._group(z)
-        room = self._room(x, y, e) / self.height
-        known, skin = NOBODY, room
-        if not room > SKIN:
-            known, skin = self._search(x, y, e, zeta, SKIN * self.height), SKIN
-            for wider in SKINS if not len(known.p) else ():  # how far may it move unseen?
-                wide = self._search(x, y, e, zeta, wider * self.height)
-                if len(wide.p):
-                    break
-                known, skin = wide, wider
-        t, self.candidates = self.tables, known._replace(cut=cut)
-        self._words = Packed(self.candidates)
-        t.found[:] = self._words.address, t.found[1] + 1
-        t.skin[0], t.seen[:] = skin * self.height, z
+        """Find the :class:`Candidates` at displacements z, with their skin; the callback of
+        kernels."""
+        t, x, (zeta, seeds) = self.tables, self.surfaces.outside(z)[0], self._seeds
+        y = displaced((seeds.weights.T, seeds.starts), seeds.dofs.T, z)
+        known, skin = self._search(x, y, zeta, SKIN * self.height), SKIN
+        for wider in SKINS if not len(known.p) else ():  # how far may it move unseen?
+            wide = self._search(x, y, zeta, wider * self.height)
+            if len(wide.p):
+                break
+            known, skin = wide, wider
+        t.skin[0] = skin * self.height
+        self.keep(known)
 
-    def _group(self, z):
-        """Set groups of facets, which are members and parts of beams, and which of them may touch.
-        Returns the Cut."""
-        f, (cut, part, fits) = self.surfaces.facets, self._stretches.cut(z)
-        k, n = np.flatnonzero(fits), len(fits) + 1
-        self._groups = np.where(part < 0, n + f.members, part)
-        members = np.zeros(n + len(self.allowed), np.int64)
-        members[self._groups] = f.members
-        self._may = self.allowed[np.ix_(members, members)]
-        for i in (k, k + 1):
-            self._may[i, k] = self._may[i, k + 1] = False
-        return cut
-
-    def _room(self, x, y, e):
-        """The largest skin within which boxes around groups say that there is nothing."""
-        f, boxes = self.surfaces.facets, np.full((2, 4, len(self._may)), -np.inf)
-        for box, at, groups in zip(boxes, (x, y), (self._groups[f.of], self._groups[e])):
-            for most, values in zip(box, (at.real, at.imag, -at.real, -at.imag)):
-                np.maximum.at(most, groups, values)
-        a, b = boxes[0][:, :, None], boxes[1][:, None]
-        away = np.maximum(0.0, np.maximum(-a[2:] - b[:2], -b[2:] - a[:2]))
-        return np.min(np.hypot(*away)[self._may], initial=FARTHEST * self.height) - np.max(
-            self._near) - self.height
-
-    def _search(self, x, y, e, zeta, skin):
-        f = self.surfaces.facets
+    def _search(self, x, y, zeta, skin):
+        t, f, e = self.tables, self.surfaces.facets, self._seeds[1].e
         trees = [scipy.spatial.cKDTree(np.column_stack([a.real, a.imag])) for a in (x, y)]
-        reach = float(np.max(self._near)) + self.height + skin
-        found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
+        found = trees[0].sparse_distance_matrix(trees[1], t.widest + self.height + skin,
+                                                output_type="ndarray")
         p, k, far = found["i"], found["j"], found["v"]
-        which = (far < self._near[e[k]] + self.height + skin) & self._may[
-            self._groups[f.of[p]], self._groups[e[k]]] & ~together(
-            self.tables, p, e[k], zeta[k], 1.0)
+        which = (far < self._near[e[k]] + self.height + skin) & may_touch(
+            t, t.groups.of[f.of[p]], t.groups.of[e[k]]) & ~together(t, p, e[k], zeta[k], 1.0)
         p, k, far = p[which], k[which], far[which]
         order = np.lexsort((far, e[k], p))
         p, k = p[order], k[order]
@@ -191,7 +178,7 @@ class Search:
         chain = f.chains[e[k]]
         group = np.unique(p * (1 + np.max(chain, initial=0)) + chain, return_inverse=True)[1]
         return Candidates(*(_packed(x, y) for x, y in (
-            (p, np.int64), (e[k], np.int64), (zeta[k], float), (group.ravel(), np.int64))), NOTHING)
+            (p, np.int64), (e[k], np.int64), (zeta[k], float), (group.ravel(), np.int64))))
 
     # parts that are one body
 
