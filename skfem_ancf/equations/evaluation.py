@@ -218,15 +218,16 @@ def hold_back(e, t, loose, clear, u, R, du, dm):
 
 
 @source
-def motion_is_clear(e, t, motion):
+def motion_is_clear(e, motion):
     """True if it is known that members do not touch on straight ways between displacements (n, N).
     """
     n, f = motion.shape[0], np.zeros(motion.shape[1])
     for k in range(n):
         u = motion[k]
-        if not rests(e.forces, u, 0.0) and not looked_free(e.forces, t, False, u, f):
+        if not rests(e.forces, u, 0.0) and not looked_free(e.forces, 0.0, False, u, f):
             return False
-        if k + 1 < n and not way_is_clear(e.forces, t, False, u, motion[k + 1] - u, f):
+        if k + 1 < n and not way_is_clear(
+                e.forces, 0.0, False, u, motion[k + 1] - u, f):
             return False
     return True
 

@@ -76,24 +76,11 @@ class Histories:
         other._have(self.forces, self.of_forces.size, history, span)
         return other
 
-    def part(self, other: "Histories", history: Array | None) -> Array | None:
-        """The part of a history that is one of the same scene without contact of members."""
-        return None if history is None else history[self._places(other)]
-
-    def joined(self, other: "Histories", history: Array | None, part: Array | None) -> Array | None:
-        """A history with another part."""
-        if not self.values.size:
-            return None
-        ours = np.array(self.rest if history is None else history)
-        ours[self._places(other)] = other.rest if part is None else part
-        return None if (ours == self.rest).all() else ours
-
-    def _places(self, other):
-        """Places of the values of a history without contact of members."""
-        out = np.arange(other.rest.size)
-        for key, at in other._parts.items():
-            out[at] = np.arange(self._parts[key].start, self._parts[key].stop)
-        return out
+    def of(self, forces: Forces) -> "Histories":
+        """Those of some of the force elements, in the same arrays."""
+        other = copy(self)
+        other._have(forces, self.of_forces.size, None, 0.0)
+        return other
 
     def kernel(self, beam: Beam) -> Any:
         """The kernel of a beam with this history."""

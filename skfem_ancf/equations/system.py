@@ -272,12 +272,18 @@ class System:
     @shared
     def _apart(self):
         given, elements = list(self._given), self._given[6]
-        given[6] = tuple([e for e in elements if not hasattr(e, "broad_search")])
-        return System(*given) if len(given[6]) < len(elements) else None
+        given[6] = [e for e in elements if not hasattr(e, "broad_search")]
+        if len(given[6]) == len(elements):
+            return None
+        other = System(*given)
+        other.histories = self.histories.of(other.forces)
+        other.forces = other.histories.forces
+        return other
 
     @property
     def apart(self) -> "System | None":
-        """The equations without contact of members; None if there is none."""
+        """The equations without contact of members, after the same histories; None if there is
+        none."""
         free = self._apart
         return free if free is None or self.clock is None else free.at(self.clock)
 

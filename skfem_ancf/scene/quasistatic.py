@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -329,12 +328,11 @@ def _next(system: System, last: Instant, t: float, *options: Any) -> Instant:
     """The equilibrium at t, by that without contact if nothing touches."""
     found: list[Instant] = []
 
-    def solve(apart, memory):
-        result = replace(last.result, memory=memory)
-        found.append(_after(apart, last._replace(result=result), t, *options))
+    def solve(apart):
+        found.append(_after(apart, last, t, *options))
         return found[0].result
 
-    result = solved_apart(system, last.result.u, last.result.memory, t, solve)
+    result = solved_apart(system, last.result.u, last.result.memory, solve)
     return _after(system, last, t, *options) if result is None else found[0]
 
 

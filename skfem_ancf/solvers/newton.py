@@ -164,7 +164,7 @@ class Search:
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""
-        found = solved_apart(self.system, self.route.u, self._memory, self._times[1], self._apart)
+        found = solved_apart(self.system, self.route.u, self._memory, self._apart)
         if found is not None:
             return found
         for name, solve in self._strategies():
@@ -193,9 +193,9 @@ class Search:
             return self._done(self._folded)
         raise self._lost()
 
-    def _apart(self, system, memory):
-        """The equilibrium of the scene without contact."""
-        other = Search(system, self._start, memory, self.rules, self.stable, self.progress,
+    def _apart(self, system):
+        """The equilibrium of the scene without contact of members."""
+        other = Search(system, self._start, self._memory, self.rules, self.stable, self.progress,
                        self._span)
         other.bounded = True
         return other.find()
