@@ -5,9 +5,9 @@ import numpy as np
 from ...core import Array
 from ..contact.pairs import PairTables
 
-#: Largest number of parts of a chain; largest turn of a part of a beam that cannot touch itself, in
-#: radians, and its least stretch.
-PARTS, ARC, LEAST = 32, 1.4, 0.85
+#: Largest number of parts of a chain, and of all but for one of each; largest turn of a part of a
+#: beam that cannot touch itself, in radians, and its least stretch.
+PARTS, ALL, ARC, LEAST = 32, 500, 1.4, 0.85
 
 
 class Discs:
@@ -17,8 +17,9 @@ class Discs:
     def __init__(self, t: PairTables, allowed: Array) -> None:
         order = np.lexsort((t.places, t.chains))
         chains, members, spans = t.chains[order], t.members[order], t.spans[order]
-        sizes = np.bincount(chains)
-        share = np.concatenate([np.arange(n) * min(n, PARTS) // max(n, 1) for n in sizes])
+        sizes = np.unique(chains, return_counts=True)[1]
+        most = max(1, min(PARTS, ALL // len(sizes)))
+        share = np.concatenate([np.arange(n) * min(n, most) // n for n in sizes])
         first = np.flatnonzero(np.diff(chains * PARTS + share, prepend=-1))
         self._first, self._last = first, np.append(first[1:], len(order))
         self._sizes = self._last - first
