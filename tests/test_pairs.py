@@ -600,6 +600,79 @@ def test_what_does_not_touch_is_solved_as_without_contact(turn):
         assert_allclose(steps.u[-1], run.u[-1], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("turn", [3.0, 4.5, 5.5])
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+def test_a_strip_bent_far_is_solved_without_searches(monkeypatch, element, turn):
+    """Corrections of Newton's method lead through many lengths: no way of theirs is looked at."""
+    searches, found, states = [], search.Search.search, []
+    for touch in (False, True):
+        scene = Scene(line(1.0, 24, 0.01, element=element, material=RUBBER)).clamp("left")
+        if touch:
+            scene.contact(0, self_contact=True)
+        scene.moment("right", turn * 1e7 * 0.02 * 0.01**3 / 12.0)
+        _ = scene.system
+        monkeypatch.setattr(search.Search, "search", lambda self, z: (
+            searches.append(z), found(self, z)))
+        states.append(scene.solve_static())
+        monkeypatch.setattr(search.Search, "search", found)
+    without, state = states
+    assert state.message == without.message and len(searches) <= 2
+    assert_allclose(state.u, without.u, rtol=0.0, atol=1e-12)
+
+
+def test_tips_that_are_apart_at_the_end_do_not_pass_each_other():
+    """Without contact one tip is below the other and beside it; with it, on the other."""
+    h, EI = 0.02, 1e7 * 0.02 * 0.02**3 / 12.0
+    stiff = StVenantKirchhoff(3e8, 0.0, 1000.0)
+    places = []
+    for touch in (False, True):
+        beams = line(1.0, 10, h, material=RUBBER), line(1.0, 10, h, (1.95, -0.1), material=stiff,
+                                                        angle=np.pi)
+        scene = Scene(*beams).clamp("left", 0).clamp("left", 1)
+        if touch:
+            scene.contact(0, 1)
+        state = scene.point_force((0.0, -EI), at=(1.0, 0.0), beam=0).solve_static()
+        places.append([state.position("right", k) for k in (0, 1)])
+    (a, b), (c, d) = places
+    assert b[0] - a[0] > 0.2 * h and a[1] < b[1] - 5.0 * h
+    assert c[0] - d[0] > h and 0.8 * h < c[1] - d[1] < 1.5 * h and len(state.contact()) > 0
+
+
+@pytest.mark.parametrize("obstacle", ["plate", "post"])
+def test_what_is_in_the_way_is_not_passed(obstacle):
+    """The end of a beam would come to rest far behind it, and touch nothing there."""
+    h, EI = 0.02, 1e7 * 0.02 * 0.02**3 / 12.0
+    ends = []
+    for touch in (False, True):
+        beam = line(1.0, 16, h, material=RUBBER)
+        if obstacle == "plate":
+            other = RigidBody(1.0, 1.0, (0.7, -0.15), outline=[
+                (-0.1, -h), (0.1, -h), (0.1, h), (-0.1, h)])
+            scene = Scene(beam, other).clamp((0.7, -0.15), other)
+            scene.point_force((0.0, -4.0 * EI), at=(1.0, 0.0), beam=0)
+        else:
+            other = line(0.4, 5, h, (0.6, 0.25), material=STEEL, angle=np.pi / 2)
+            scene = Scene(beam, other).clamp("left", 1).moment("right", 3.5 * EI, beam=0)
+        if touch:
+            scene.contact(beam, other)
+        state = scene.clamp("left", 0).solve_static()
+        ends.append(state.position("right", 0))
+    assert len(state.contact()) > 0 and np.linalg.norm(ends[1] - ends[0]) > 0.2
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+def test_a_strip_wound_on_itself_stops_there(element):
+    """By a moment that would close it to a circle and more."""
+    ends = []
+    for touch in (False, True):
+        scene = Scene(line(1.0, 24, 0.01, element=element, material=RUBBER)).clamp("left")
+        if touch:
+            scene.contact(0, self_contact=True)
+        state = scene.moment("right", 6.6 * 1e7 * 0.02 * 0.01**3 / 12.0).solve_static()
+        ends.append(state.displacement("right"))
+    assert len(state.contact()) > 0 and np.linalg.norm(ends[1] - ends[0]) > 0.01
+
+
 def test_what_does_not_touch_is_seldom_looked_at(monkeypatch):
     """A step evaluates forces at least three times."""
     looks = {"look": 0, "search": 0}

@@ -31,7 +31,8 @@ COMPILING = {"StrainTables": 8.0, "cables": 1.0, "own": 1.0, "elements": 7.0, "c
              "equilibrium": 1.5, "tangent": 0.5, "force": 0.2, "linearised": 0.2, "steps": 1.5}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "histories": 4.0, "pairs": 8.0, "eigenstrains": 5.0,
-              "gradients": 2.0, "collocate": 25.0, "mean_force": 1.0, "viscous_force": 1.0}
+              "gradients": 2.0, "motion_is_clear": 0.5, "collocate": 25.0, "mean_force": 1.0,
+              "viscous_force": 1.0}
 LOADING = 0.5
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds of compiling that need no reason once the parts are loaded.

@@ -5,7 +5,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ..actions.forces.kernels import (NO_SPAN, add_elastic_force, add_element_tangent,
-                                      contact_along, contact_work, nothing_touches, way_is_clear)
+                                      contact_along, contact_work, looked_free, nothing_touches,
+                                      rests, way_is_clear)
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
@@ -181,7 +182,8 @@ def hold_back(e, t, loose, clear, u, R, du, dm):
     # contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close
     # in turn.
     work, two, scratch = dot(R, du), np.empty(2), np.zeros(u.size)
-    if loose == 0.0 and clear and way_is_clear(e.forces, t, u, du, scratch):
+    if loose == 0.0 and clear and way_is_clear(
+            e.forces, t, e.forces.contacts.number > 0, u, du, scratch):
         return 1
     contact_along(e.forces, t, u, du, two)
     if not work > 0.0 and loose == 0.0:
@@ -213,6 +215,21 @@ def hold_back(e, t, loose, clear, u, R, du, dm):
     for k in indices(dm.size):
         dm[k] *= s
     return 0
+
+
+@source
+def motion_is_clear(e, motion):
+    """True if it is known that members do not touch on straight ways between displacements (n, N).
+    """
+    n, f = motion.shape[0], np.zeros(motion.shape[1])
+    for k in range(n):
+        u = motion[k]
+        if not rests(e.forces, u, 0.0) and not looked_free(e.forces, 0.0, False, u, f):
+            return False
+        if k + 1 < n and not way_is_clear(
+                e.forces, 0.0, False, u, motion[k + 1] - u, f):
+            return False
+    return True
 
 
 @source

@@ -76,6 +76,12 @@ class Histories:
         other._have(self.forces, self.of_forces.size, history, span)
         return other
 
+    def of(self, forces: Forces) -> "Histories":
+        """Those of some of the force elements, in the same arrays."""
+        other = copy(self)
+        other._have(forces, self.of_forces.size, None, 0.0)
+        return other
+
     def kernel(self, beam: Beam) -> Any:
         """The kernel of a beam with this history."""
         past = self.past(beam)

@@ -18,6 +18,7 @@ from ..dynamics.sensors import Recorder, Sensor
 from ..equations.stability import largest_displacement, position_weights
 from ..equations.system import System
 from ..results.state import State
+from ..solvers.apart import solved_apart
 from ..solvers.increment import Increment, Options, Route
 from ..solvers.newton import Search, Steps as Rules
 from ..solvers.iteration import StaticResult, LoadStepFailed
@@ -323,8 +324,20 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
             yield begin
 
 
-def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
-          smallest: bool, drag: Array | None) -> Instant:
+def _next(system: System, last: Instant, t: float, *options: Any) -> Instant:
+    """The equilibrium at t, by that without contact if nothing touches."""
+    found: list[Instant] = []
+
+    def solve(apart):
+        found.append(_after(apart, last, t, *options))
+        return found[0].result
+
+    result = solved_apart(system, last.result.u, last.result.memory, solve)
+    return _after(system, last, t, *options) if result is None else found[0]
+
+
+def _after(system: System, last: Instant, t: float, rules: Rules, stable: bool,
+           smallest: bool, drag: Array | None) -> Instant:
     """The equilibrium at t; by all strategies if the increment is the smallest."""
     route = Route(last.result.u, None, (1.0, 1.0), (last.t, t), t - last.t)
     start = StaticResult(**vars(last.result) | {

@@ -15,6 +15,7 @@ from ..core import (NO_FACTORS, AncfError, Array, ConvergenceError, InputError, 
 from ..equations import stability
 from ..equations.system import System
 from . import strategies
+from .apart import solved_apart
 from .continuation import continuation
 from .increment import Increment, Options, Route
 from .iteration import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
@@ -140,7 +141,7 @@ class Search:
         self.rules, self.stable, self.progress, self._span = rules, stable, progress, span
         contacts, clock = system.forces.contacts, system.clock
         self.stabilised_by_loads = bool(system.constraints.missing_supports)
-        self.touches = bool(contacts.obstacles or system.forces.changing)
+        self.touches = self.bounded = bool(contacts.obstacles or system.forces.changing)
         self._has_friction = bool(contacts.anchored)
         self._auto, self._at_once = rules.method == "auto", rules.first_step == 1.0
         self.attempts: list[Attempt] = []
@@ -163,6 +164,9 @@ class Search:
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""
+        found = solved_apart(self.system, self.route.u, self._memory, self._apart)
+        if found is not None:
+            return found
         for name, solve in self._strategies():
             self._spent = 0
             try:
@@ -188,6 +192,13 @@ class Search:
         if self._folded is not None:
             return self._done(self._folded)
         raise self._lost()
+
+    def _apart(self, system):
+        """The equilibrium of the scene without contact of members."""
+        other = Search(system, self._start, self._memory, self.rules, self.stable, self.progress,
+                       self._span)
+        other.bounded = True
+        return other.find()
 
     def _strategies(self) -> Iterator[tuple[str, Callable[[], StaticResult]]]:
         """Names and functions of strategies, in order; what applies depends on those before."""
@@ -295,7 +306,7 @@ class Search:
     def _exhausted(self):
         """True if all strategies together have reached :data:`MOST`."""
         spent = self._spent + sum(attempt.iterations for attempt in self.attempts)
-        return self.touches and self._at_once and self._auto and spent >= MOST
+        return self.bounded and self._at_once and self._auto and spent >= MOST
 
     # strategies
 

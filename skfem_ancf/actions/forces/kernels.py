@@ -283,7 +283,13 @@ def add_friction_tangent(tables, t, factor, u, v, A):
 @source
 def nothing_touches(tables, u):
     """True if it is known that no obstacle touches at u, and that changing elements do nothing."""
-    return (tables.contacts.number == 0 or untouched(tables.contacts, FORCE, u)) and (
+    return _is_free(tables, tables.contacts.number > 0, u)
+
+
+@source
+def _is_free(tables, walls, u):
+    """True if it is known that members do not touch at u and, with ``walls``, nor do obstacles."""
+    return (not walls or untouched(tables.contacts, FORCE, u)) and (
         tables.changing == 0 or rests(tables, u, 0.0))
 
 
@@ -294,24 +300,34 @@ def may_pass(tables, u0, u1):
 
 
 @source
-def way_is_clear(tables, t, u, du, f):
-    """True if it is known that nothing touches on the way from u, where nothing does, along du; f
-    is workspace."""
+def looked_free(tables, t, walls, u, f):
+    """:func:`_is_free`, after a look at u; f is workspace, zero on return."""
+    if walls:
+        _ask(tables, _at(FORCE, t), u, u, f)
+    if tables.paired > 0:
+        _add_pairs(tables, 0.0, u, u, f)
+    clear(f)
+    return _is_free(tables, walls, u)
+
+
+@apart("contacts", ForceTables, float, bool, F1, F1, F1, returns=bool)
+def way_is_clear(tables, t, walls, u, du, f):
+    """True if it is known that members do not touch on the way from u, where they do not, along du
+    and, with ``walls``, nor do obstacles; f is workspace."""
     ahead = u + du
-    if nothing_touches(tables, ahead):
+    if _is_free(tables, walls, ahead):
         return True
     # what is left at u, and what is found ahead, are balls around points that have to meet, or
     # others between them
     contacts = tables.contacts
     by_obstacles, by_members = left_of(contacts.clear, u), left_of(tables.clear, u)
     for _ in range(BALLS):
-        contact_work(tables, t, ahead, du, f)
-        if not nothing_touches(tables, ahead):
+        if not looked_free(tables, t, walls, ahead, f):
             return False
-        if (contacts.number == 0 or is_clear(contacts.clear, u, -by_obstacles)) and (
+        if (not walls or is_clear(contacts.clear, u, -by_obstacles)) and (
                 tables.changing == 0 or rests(tables, u, -by_members)):
             return True
-        share = min(share_of(contacts.clear, u) if contacts.number > 0 else 1.0,
+        share = min(share_of(contacts.clear, u) if walls else 1.0,
                     share_of(tables.clear, u) if tables.changing > 0 else 1.0)
         if not share * BALLS > 1.0:
             return False
