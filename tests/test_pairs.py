@@ -520,6 +520,19 @@ def test_the_mean_force_of_a_small_move_is_near_that_at_its_ends(element):
         assert 0.0 < np.abs(contact.mean_force(x, y, 0.0, 1e-3)).max() < 1.15 * max(ends)
 
 
+@pytest.mark.parametrize("seed", [38, 90, 107])
+def test_coarse_beams_that_meet_with_their_corners_keep_energy_and_momenta(seed):
+    """Corners turn and slide from face to face, in steps of a tenth of the height and more."""
+    rng = np.random.default_rng(seed)
+    rods = [line(1.0, 3, rng.uniform(0.01, 0.08), (rng.uniform(-0.3, 0.3), 0.75 * k),
+                 ELEMENTS[seed % 4], RUBBER, angle=rng.uniform(-0.6, 0.6)) for k in range(2)]
+    scene = Scene(*rods).contact("all", friction=0.3 * (seed % 3 == 2))
+    history = scene.initial_velocity((rng.uniform(-1.0, 1.0), -6.0), 1).integrate(0.3, 2e-3)
+    energy, turn = history.total_energy + history.dissipated, history.angular_momentum
+    assert any(len(history.state(k).contact()) for k in range(0, 151, 3))
+    assert np.ptp(energy) < 1e-10 * energy[0] and np.ptp(turn) < 1e-10 * np.abs(turn).max()
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_contact_is_that_of_a_search_in_each_evaluation(monkeypatch, friction):
     """Also of fast, thin members; what is not looked at does not touch."""

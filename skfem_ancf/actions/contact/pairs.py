@@ -39,6 +39,8 @@ OPPOSED = -0.2
 SAME = 0.8
 #: Iterations for the place of a mean force; change of a gap in heights below which none is needed.
 MEANS, CLOSE = 8, 1e-9
+#: Largest change of a gap in a step, over the motion along and across a facet, that is no jump.
+JUMP = 1.0
 #: The gap where nothing is.
 NOTHING = 1e300
 #: Distance in heights for which a list of candidates is enough, and the largest one.
@@ -539,13 +541,15 @@ def touch_of(t, f0, f1, met):
         s, stiffness = t.sides[t.of[p]] * t.offsets[t.of[p]], stiffness_of(t, p, e)
         a, b = vectors(t, f0, p, e, met.zeta[i]), vectors(t, f1, p, e, met.zeta[i])
         by_gap, by_slip = mean_slope(a, b, t.sides[e], s), slip_row(a, b, s)
-        # where the gap is that of another facet at one end, its mean derivative is inclined
-        way = way_along(a, b, by_slip)
-        missing = met.before[i] - met.after[i] - way_along(a, b, by_gap)
-        inclined = missing * way / (np.maximum(way * way, missing * missing)
-                                    + (CLOSE * t.height) ** 2)
+        # where the gap is that of another facet at one end, its mean derivative is between both:
+        # the nearest one along the motion with exact work, unless the gap jumps
+        way, change = way_along(a, b, by_slip), way_along(a, b, by_gap)
+        missing = met.before[i] - met.after[i] - change
+        more = missing / (np.maximum(way * way + change * change, (missing / JUMP) ** 2)
+                          + (CLOSE * t.height) ** 2)
         for v in range(COMPONENTS // 2):
-            put(gap, v, i, by_gap[v] + scaled(inclined, by_slip[v]))
+            put(gap, v, i, scaled(1.0 + more * change, by_gap[v]) + scaled(
+                more * way, by_slip[v]))
             put(slip, v, i, by_slip[v])
             put(moved, v, i, b[v] - a[v])
         k[i] = stiffness

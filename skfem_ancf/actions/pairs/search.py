@@ -9,8 +9,8 @@ import numpy as np
 import scipy
 
 from ...core import Array, Packed, handle_of
-from ..contact.pairs import (APART, EDGE, ON, OPPOSED, SAME, SKIN, Candidates, Groups, PairTables, Seeds, facing,
-                             may_touch, together)
+from ..contact.pairs import (APART, EDGE, ON, OPPOSED, SAME, SKIN, Candidates, Groups, PairTables,
+                             Seeds, facing, may_touch, together)
 from ..contact.points import cross, dot
 from ..contact.stretches import Cut
 from ..contact.tables import weights_of_motion
