@@ -51,7 +51,7 @@ def _stays_clear(system, u0, u1):
     run = system.backend.of(motion_is_clear)
     if motion is None or len(motion) < 3:
         return motion is not None and bool(run(motion))
-    far = np.all([e.discs.stay_apart(motion.view(complex)[:, at[::2] // 2])
+    far = np.all([e.broad_search.discs.stay_apart(motion.view(complex)[:, at[::2] // 2])
                   for e, at in system.forces.changing], axis=0)
     return all(far[k] or run(motion[k:k + 2]) for k in range(len(far)))
 

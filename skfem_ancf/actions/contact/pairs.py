@@ -59,12 +59,14 @@ class Candidates(NamedTuple):
 
 
 class Seeds(NamedTuple):
-    """Places of facets, as ``starts + sum(weights * z[dofs])``, (S,)."""
+    """Places of facets, as ``starts + sum(weights * z[dofs])``, (S,), and the largest distance of
+    the surface from the nearest."""
 
     e: I1
     dofs: I2  # (B, S)
     weights: C2
     starts: C1
+    widest: float
 
 
 class Groups(NamedTuple):
@@ -105,7 +107,6 @@ class PairTables(NamedTuple):
     stiffness: F1
     reach: F2  # the least and largest zeta of closest points, (2, F)
     near: F1  # distance of a point of a facet from the guess for it
-    widest: float  # the largest one
     members: I1
     chains: I1
     curves: I1
@@ -293,7 +294,7 @@ def _room(t, x, z):
             high = np.maximum(0.0, np.maximum(a[1, i] + c[3, j], c[1, j] + a[3, i]))
             apart[k] = where(may_touch(t, i, j), np.sqrt(wide * wide + high * high), NOTHING)
         least = min(least, smallest(apart))
-    return least - t.widest - t.height
+    return least - t.seeds.widest - t.height
 
 
 @source

@@ -6,8 +6,8 @@ import numpy as np
 from scipy import sparse
 
 from ...beam import Beam, Layout
-from ...core import (Array, InputError, NameUnknown, cached_property, call_loaded, refuse,
-                     require_flag, require_label, require_not_negative, require_positive, shown)
+from ...core import (Array, InputError, NameUnknown, call_loaded, refuse, require_flag,
+                     require_label, require_not_negative, require_positive, shown)
 from ..contact.contacts import SEEN
 from ..contact.points import add_resistance, potential, respond
 from ..contact.pairs import (COMPONENTS, both_faced, faced, meet, pair_accept, pair_force,
@@ -16,7 +16,6 @@ from ..forces.base import ForceElement
 from ..places import Vector
 from .facets import ROUND, facets_of, rounded
 from .search import BETWEEN, Search, Surfaces
-from .sweep import Discs
 
 #: Width of the transition from no pressure to proportional pressure, in heights, as of obstacles.
 WIDTH = 1e-3
@@ -132,16 +131,10 @@ class BodyContact(ForceElement):
         self.broad_search = Search(surfaces, sharp, allowed, solids,
                                    (self.penalty, WIDTH, self.friction), places)
         self._surfaces, self.origin = surfaces, origin
-        self._allowed = allowed
         self.weights = self.broad_search.weights
         self.near = NEAR * self.broad_search.height
         self._begin(layout)
         return [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in self.dofs]
-
-    @cached_property
-    def discs(self) -> Discs:
-        """Discs around parts of the members."""
-        return Discs(self.broad_search.tables, self._allowed)
 
     def _members(self, layout):
         """Numbers of the members, and which of all may touch."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ...core import Array, Packed, handle_of
+from ...core import Array, Packed, cached_property, handle_of
 from ..contact.pairs import (APART, EDGE, ON, OPPOSED, SAME, SKIN, Candidates, Groups, PairTables,
                              Seeds, facing, may_touch, together)
 from ..contact.points import cross, dot
@@ -16,6 +16,7 @@ from ..contact.stretches import Cut
 from ..contact.tables import weights_of_motion
 from .facets import Facets
 from .stretches import stretches_of
+from .sweep import Discs
 
 #: Distance of seeds along facets, largest number on a facet; distances in heights for which a list
 #: of candidates is enough that are tried where nothing is near.
@@ -99,9 +100,9 @@ class Search:
         e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(
             (2.0 * np.arange(m) + 1.0) / m - 1.0, len(f.sides))
         weights, at = surfaces.curve(e, zeta, 0)
-        self._seeds = zeta, Seeds(_packed(e, np.int64), _packed(f.dofs[e].T, np.int64),
-                                  _packed(weights.T, complex), _packed(at, complex))
         self._near = 0.6 * f.lengths / m + f.offsets
+        self._seeds = zeta, Seeds(_packed(e, np.int64), _packed(f.dofs[e].T, np.int64), _packed(
+            weights.T, complex), _packed(at, complex), float(np.max(self._near)))
         self.joined = self._joined(solids)
         elements, rows = stretches_of(sharp, np.diag(allowed), f, self.weights, places)
         parts = 2 + 2 * len(rows.chains)
@@ -114,8 +115,7 @@ class Search:
         self.tables = PairTables(
             used=np.arange(n), dofs=_packed(f.dofs.T, np.int64),
             weights=_packed(f.weights.transpose(1, 2, 0), complex),
-            starts=_packed(f.starts.T, complex), near=self._near,
-            widest=float(np.max(self._near)), reach=_packed(
+            starts=_packed(f.starts.T, complex), near=self._near, reach=_packed(
                 f.ends.clip(-1.0, 1.0).T * (1.0 + np.where(np.abs(f.ends) == 1.0, EDGE, ON).T),
                 float),
             joined=_packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
@@ -144,6 +144,11 @@ class Search:
         one.keep(one.candidates)
         return one
 
+    @cached_property
+    def discs(self) -> Discs:
+        """Discs around parts of the members."""
+        return Discs(self.tables, self.allowed)
+
     def keep(self, candidates: Candidates) -> None:
         """Let the tables have these candidates."""
         self.candidates, self._words = candidates, Packed(candidates)
@@ -166,7 +171,7 @@ class Search:
     def _search(self, x, y, zeta, skin):
         t, f, e = self.tables, self.surfaces.facets, self._seeds[1].e
         trees = [scipy.spatial.cKDTree(np.column_stack([a.real, a.imag])) for a in (x, y)]
-        found = trees[0].sparse_distance_matrix(trees[1], t.widest + self.height + skin,
+        found = trees[0].sparse_distance_matrix(trees[1], t.seeds.widest + self.height + skin,
                                                 output_type="ndarray")
         p, k, far = found["i"], found["j"], found["v"]
         which = (far < self._near[e[k]] + self.height + skin) & may_touch(
