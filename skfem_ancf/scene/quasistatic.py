@@ -324,16 +324,25 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
             yield begin
 
 
-def _next(system: System, last: Instant, t: float, *options: Any) -> Instant:
+def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool, smallest: bool,
+          drag: Array | None) -> Instant:
     """The equilibrium at t, by that without contact if nothing touches."""
-    found: list[Instant] = []
+    found: list[Any] = []
 
     def solve(apart):
-        found.append(_after(apart, last, t, *options))
+        try:
+            found.append(_after(apart, last, t, rules, stable, smallest, drag))
+        except LoadStepFailed as failure:
+            found.append(failure)
+            raise
         return found[0].result
 
     result = solved_apart(system, last.result.u, last.result.memory, solve)
-    return _after(system, last, t, *options) if result is None else found[0]
+    if result is None and found and isinstance(found[0], LoadStepFailed) and not smallest and (
+            system.histories.path_dependent):
+        raise found[0]  # what yields needs smaller increments
+    return found[0] if result is not None else _after(
+        system, last, t, rules, stable, smallest, drag)
 
 
 def _after(system: System, last: Instant, t: float, rules: Rules, stable: bool,

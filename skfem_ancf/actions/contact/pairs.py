@@ -43,8 +43,9 @@ MEANS, CLOSE = 8, 1e-9
 JUMP = 1.0
 #: The gap where nothing is.
 NOTHING = 1e300
-#: Distance in heights for which a list of candidates is enough, and the largest one.
-SKIN, FARTHEST = 0.5, 1e6
+#: Distance in heights for which a list of candidates is enough, and the largest one; part of it
+#: after which boxes are compared again.
+SKIN, FARTHEST, AGAIN = 0.5, 1e6, 0.1
 #: Components of the vectors r, t, c, T of a contact point.
 COMPONENTS = 8
 
@@ -228,7 +229,8 @@ def look(t, z, found):
         found.e[p], found.zeta[p], found.gap[p] = -1, 0.0, 0.0
     u, none = z.view(np.float64), t.sides[:0]
     travel = farthest(t.moves, u, t.seen.view(np.float64))
-    if not travel < 0.5 * t.skin[0] or not straight_within(t.rows, t.cut, z) > 0.0:
+    enough = 0.5 if t.found[2] > 0 else AGAIN  # boxes are soon compared again
+    if not travel < enough * t.skin[0] or not straight_within(t.rows, t.cut, z) > 0.0:
         travel = 0.0
         _group(t, z)
         t.skin[0], t.found[1], t.found[2] = _room(t, x, z), t.found[1] + 1, 0
