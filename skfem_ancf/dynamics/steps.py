@@ -428,7 +428,7 @@ def _iterate(e, matrices, rule, s, w, state):
             augment_contact(e.forces, s.t, w.x.u, taken)
             if taken[0] > 0.0:
                 status, left, state.correction[0] = GO_ON, min(ITERATIONS, most), -1.0
-        if status == DONE and state.guess[0] > 0 and rests_by_margin(e.forces, w.x.u):
+        if status == DONE and state.guess[0] > 0 and rests_by_margin(e.forces, w.y[0], w.x.u):
             status, state.guess[0] = GO_ON, 0
         if status == RESTART:
             _start(e, matrices, rule, s, w, state)

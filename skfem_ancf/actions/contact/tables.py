@@ -113,10 +113,9 @@ def pair_of(tables, k):
 
 
 #: How far points may move from displacements at which nothing touches; 1 if the tangent of the last
-#: step has entries of contact; how far anchors of friction follow points; number of steps on whose
-#: way, or of iterations at whose start, something may touch; number of searches of members until
-#: then; from SEEN on the displacements (N,), then weights of pairs of DOFs (2, N / 2), see
-#: :func:`weights_of_motion`.
+#: step has entries of contact; how far anchors of friction follow points; number of iterations at
+#: whose start something may touch; number of searches of members until then; from SEEN on the
+#: displacements (N,), then weights of pairs of DOFs (2, N / 2), see :func:`weights_of_motion`.
 MARGIN, HAS_ENTRIES, FOLLOWED, PASSED, SEARCHED, SEEN = range(6)
 #: Part of a gap that is the margin; half of it if two surfaces may approach each other.
 SAFE = 0.9

@@ -170,9 +170,9 @@ def at_rest(tables, u0, u1, guess):
 
 
 @source
-def rests_by_margin(tables, u):
-    """True if only a margin says that no changing element does anything at u."""
-    return is_clear(tables.clear, u, 0.0) and not rests(tables, u, 0.0)
+def rests_by_margin(tables, u0, u1):
+    """True if margins alone say that no changing element does anything at both displacements."""
+    return at_rest(tables, u0, u1, 1) and not at_rest(tables, u0, u1, 0)
 
 
 @source
