@@ -270,7 +270,7 @@ class System:
         return MassSolver(self)
 
     @shared
-    def _apart(self):
+    def _free(self):
         given, elements = list(self._given), self._given[6]
         given[6] = [e for e in elements if not hasattr(e, "broad_search")]
         if len(given[6]) == len(elements):
@@ -281,14 +281,14 @@ class System:
         return other
 
     @property
-    def apart(self) -> "System | None":
+    def without_contact(self) -> "System | None":
         """The equations without contact of members, after the same histories; None if there is
         none."""
-        free = self._apart
+        free = self._free
         return free if free is None or self.clock is None else free.at(self.clock)
 
     @shared
-    def starts_apart(self) -> bool:
+    def starts_untouched(self) -> bool:
         """True if members do not touch in the reference configuration."""
         return all(hasattr(e, "least_gap") and e.least_gap(np.zeros((len(at) // 2, 2))) > 0.0
                    for e, at in self.forces.changing)

@@ -18,10 +18,10 @@ from ..dynamics.sensors import Recorder, Sensor
 from ..equations.stability import largest_displacement, position_weights
 from ..equations.system import System
 from ..results.state import State
-from ..solvers.apart import solved_apart
 from ..solvers.increment import Increment, Options, Route
 from ..solvers.newton import Search, Steps as Rules
 from ..solvers.iteration import StaticResult, LoadStepFailed
+from ..solvers.without_contact import solved_without_contact
 from .solve import displacement
 
 logger = logging.getLogger(__name__)
@@ -327,20 +327,15 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
 def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool, smallest: bool,
           drag: Array | None) -> Instant:
     """The equilibrium at t, by that without contact if nothing touches."""
-    found: list[Any] = []
+    found: list[Instant] = []
 
-    def solve(apart):
-        try:
-            found.append(_after(apart, last, t, rules, stable, smallest, drag))
-        except LoadStepFailed as failure:
-            found.append(failure)
-            raise
+    def solve(free):
+        found.append(_after(free, last, t, rules, stable, smallest, drag))
         return found[0].result
 
-    result = solved_apart(system, last.result.u, last.result.memory, solve)
-    if result is None and found and isinstance(found[0], LoadStepFailed) and not smallest and (
-            system.histories.path_dependent):
-        raise found[0]  # what yields needs smaller increments
+    # what yields needs smaller increments
+    result = solved_without_contact(system, last.result.u, last.result.memory, solve,
+                                    cut=system.histories.path_dependent and not smallest)
     return found[0] if result is not None else _after(
         system, last, t, rules, stable, smallest, drag)
 

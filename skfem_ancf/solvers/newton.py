@@ -15,12 +15,12 @@ from ..core import (NO_FACTORS, AncfError, Array, ConvergenceError, InputError, 
 from ..equations import stability
 from ..equations.system import System
 from . import strategies
-from .apart import solved_apart
 from .continuation import continuation
 from .increment import Increment, Options, Route
 from .iteration import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
 from .strategies import MOST_FROM_SOFT
+from .without_contact import solved_without_contact
 
 logger = logging.getLogger(__name__)
 
@@ -164,7 +164,7 @@ class Search:
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""
-        found = solved_apart(self.system, self.route.u, self._memory, self._apart)
+        found = solved_without_contact(self.system, self.route.u, self._memory, self._free)
         if found is not None:
             return found
         for name, solve in self._strategies():
@@ -193,7 +193,7 @@ class Search:
             return self._done(self._folded)
         raise self._lost()
 
-    def _apart(self, system):
+    def _free(self, system):
         """The equilibrium of the scene without contact of members."""
         other = Search(system, self._start, self._memory, self.rules, self.stable, self.progress,
                        self._span)

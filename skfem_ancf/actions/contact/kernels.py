@@ -22,15 +22,14 @@ from .points import (RESPONSE, TOUCH, Touch, add_bend, add_coupling, add_resista
                      cross, dot, mean_pressure, pressure_slope, product, put, respond,
                      return_mapping, scaled, spread, turned, vector)
 from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, DAMPED_TANGENT, END,
-                     FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SAFE, SETTLE, TINY, ContactTables,
-                     Request, is_clear, pair_of, set_clear, stiffness_factor, transition)
+                     FAR, FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SAFE, SETTLE, TINY,
+                     ContactTables, Request, is_clear, pair_of, set_clear, stiffness_factor,
+                     transition)
 
 #: Largest distance at which anchors follow points in a motion, in radii of an element.
 BEYOND = 4.0
 #: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
-#: The gap where nothing is.
-FAR = 1e300
 #: Anchors of slipped points are inside of the limit by these parts of it and of an element, so that
 #: they stick at the start of the next step whatever the last digit.
 INSIDE, NOWHERE = 1e-9, 1e-14

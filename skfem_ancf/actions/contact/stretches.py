@@ -15,15 +15,13 @@ from ...core import C1, C2, F1, I1, I2, indices, shaped, source, where
 from ...core.band import smallest
 from ..tables import least_each
 from .points import cross, dot, scaled, size
-from .tables import TINY
+from .tables import FAR, TINY
 
 #: Least progress along d, relative to the reference length: 3 ALONG - 1 > 0.75.
 ALONG = 0.65
 #: Largest change of direction in a part of a beam, of which a stretch has two; directions that are
 #: as near to each other count as equal.
 TURN, EQUAL = 0.7, 0.2
-#: How far points may move that nothing limits.
-FAR = 1e300
 
 
 class Rows(NamedTuple):

@@ -23,6 +23,8 @@ ANCHORED, RATE, BILATERAL, HEAD = range(4)
 #: Flags of history data: anchors, angles of torsional springs, multipliers.
 ANCHORS, TURNS, PRESSURES = 1, 2, 4
 TINY = 1e-200
+#: The gap where nothing is.
+FAR = 1e300
 
 
 class Request(NamedTuple):

@@ -13,11 +13,11 @@ from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import ELEMENTS, POSES, call_custom
 from ...core import F1, F2, I1, MADE, apart, indices, shaped, source
 from ..tables import add_each, add_products
-from ..contact.kernels import FAR, of_contacts, untouched
+from ..contact.kernels import of_contacts, untouched
 from ..contact.pairs import pair_accept, pair_force, pair_tables
 from ..contact.stretches import straight_within
-from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SAFE,
-                              SEARCHED, SETTLE, TANGENT, TURNS, ContactTables, Request,
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FAR, FORCE, HAS_ENTRIES, RATE,
+                              SAFE, SEARCHED, SETTLE, TANGENT, TURNS, ContactTables, Request,
                               RESISTING as RUBBING, is_clear, left_of, motion, set_clear,
                               share_of)
 

@@ -15,7 +15,7 @@ from ..contact.points import cross, dot
 from ..contact.stretches import Cut
 from ..contact.tables import weights_of_motion
 from .facets import Facets
-from .stretches import stretches_of
+from .stretches import packed, stretches_of
 from .sweep import Discs
 
 #: Distance of seeds along facets, largest number on a facet; distances in heights for which a list
@@ -101,31 +101,31 @@ class Search:
             (2.0 * np.arange(m) + 1.0) / m - 1.0, len(f.sides))
         weights, at = surfaces.curve(e, zeta, 0)
         self._near = 0.6 * f.lengths / m + f.offsets
-        self._seeds = zeta, Seeds(_packed(e, np.int64), _packed(f.dofs[e].T, np.int64), _packed(
-            weights.T, complex), _packed(at, complex), float(np.max(self._near)))
+        self._seeds = zeta, Seeds(packed(e, np.int64), packed(f.dofs[e].T, np.int64), packed(
+            weights.T, complex), packed(at, complex), float(np.max(self._near)))
         self.joined = self._joined(solids)
         elements, rows = stretches_of(sharp, np.diag(allowed), f, self.weights, places)
         parts = 2 + 2 * len(rows.chains)
         penalty, width, friction = numbers
-        of_facets = {name: _packed(getattr(f, name), kind) for kind, names in (
+        of_facets = {name: packed(getattr(f, name), kind) for kind, names in (
             (float, "sides offsets places lengths spans heights stiffness zeta areas"),
             (np.int64, "members chains curves of")) for name in names.split()}
         if penalty is not None:
             of_facets["stiffness"] = np.full(len(f.sides), penalty)
         self.tables = PairTables(
-            used=np.arange(n), dofs=_packed(f.dofs.T, np.int64),
-            weights=_packed(f.weights.transpose(1, 2, 0), complex),
-            starts=_packed(f.starts.T, complex), near=self._near, reach=_packed(
+            used=np.arange(n), dofs=packed(f.dofs.T, np.int64),
+            weights=packed(f.weights.transpose(1, 2, 0), complex),
+            starts=packed(f.starts.T, complex), near=self._near, reach=packed(
                 f.ends.clip(-1.0, 1.0).T * (1.0 + np.where(np.abs(f.ends) == 1.0, EDGE, ON).T),
                 float),
-            joined=_packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
+            joined=packed(self.joined, float).reshape(-1, 4), begins=np.zeros(len(f.of)),
             opposed=np.where(np.arange(len(f.of)) < len(sharp.of), OPPOSED, SAME),
-            point_dofs=_packed(surfaces.dofs.T, np.int64), N=_packed(N.T, complex),
-            D=_packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
+            point_dofs=packed(surfaces.dofs.T, np.int64), N=packed(N.T, complex),
+            D=packed(D.T, complex), height=h, width=width * h, friction=friction, handle=0,
             found=np.zeros(3, np.int64), seen=np.zeros(n, complex), moves=self.weights,
             skin=np.zeros(1), seeds=self._seeds[1], groups=Groups(
                 np.zeros(len(f.sides), np.int64), np.zeros(parts + len(allowed), np.int64),
-                _packed(elements, np.int64), allowed.astype(np.int64)), rows=rows,
+                packed(elements, np.int64), allowed.astype(np.int64)), rows=rows,
             cut=Cut(np.zeros(max(len(rows.chains), 1), np.int64), np.ones(1, np.int64),
                     np.zeros((2, parts), np.int64), np.zeros(parts)), start=facing(0, 0, 0),
             start_at=np.zeros(0, complex), history=np.zeros(1), **of_facets)
@@ -183,7 +183,7 @@ class Search:
         p, k = p[first], k[first]
         chain = f.chains[e[k]]
         group = np.unique(p * (1 + np.max(chain, initial=0)) + chain, return_inverse=True)[1]
-        return Candidates(*(_packed(x, y) for x, y in (
+        return Candidates(*(packed(x, y) for x, y in (
             (p, np.int64), (e[k], np.int64), (zeta[k], float), (group.ravel(), np.int64))))
 
     # parts that are one body
@@ -294,10 +294,6 @@ class Search:
                     n = int(np.argmax(hit))
                     return a[p[n]] + t[n] * (b - a)[p[n]]
         return None
-
-
-def _packed(x, kind):
-    return np.ascontiguousarray(x, dtype=kind)
 
 
 def crossing(a: Array, b: Array) -> Array:

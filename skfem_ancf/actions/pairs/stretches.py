@@ -73,10 +73,10 @@ def stretches_of(f: Facets, touch: Array, facets: Facets, moves: Array, places: 
     weights, dofs = np.abs(x[:, :-1]), f.dofs[e]
     sums = [np.sum(weights * own / np.maximum(most[dofs], TINY), axis=1)
             for most, own in zip(moves, (places[dofs], ~places[dofs]))]
-    return of, Rows(_packed(dofs.T, np.int64), _packed(x[:, :-1].T, complex),
-                    _packed(x[:, -1], complex), _packed(least, float),
-                    _packed(np.maximum(*sums), float), _packed(at[e], np.int64),
-                    _packed(chains, np.int64), n - 1)
+    return of, Rows(packed(dofs.T, np.int64), packed(x[:, :-1].T, complex),
+                    packed(x[:, -1], complex), packed(least, float),
+                    packed(np.maximum(*sums), float), packed(at[e], np.int64),
+                    packed(chains, np.int64), n - 1)
 
 
 _I, _C = np.zeros((2, 0), np.int64), np.zeros((2, 0), complex)
@@ -84,7 +84,8 @@ _I, _C = np.zeros((2, 0), np.int64), np.zeros((2, 0), complex)
 NO_ROWS = Rows(_I, _C, _C[0], np.zeros(0), np.zeros(0), _I[0], _I[0], 1)
 
 
-def _packed(x, kind):
+def packed(x: Array, kind: Any) -> Array:
+    """A contiguous array of a kind."""
     return np.ascontiguousarray(x, dtype=kind)
 
 

@@ -25,20 +25,24 @@ logger = logging.getLogger(__name__)
 TURN, MOST = 1.0, 40
 
 
-def solved_apart(system: System, u: Array, memory: Array | None,
-                 solve: Callable[[System], StaticResult]) -> StaticResult | None:
+def solved_without_contact(system: System, u: Array, memory: Array | None,
+                           solve: Callable[[System], StaticResult], cut: bool = False
+                           ) -> StaticResult | None:
     """The result of ``solve`` for the scene without contact of members, if it is known that they do
-    not touch from u (N,) to there; else None."""
-    apart = system.apart
-    if apart is None or system.constraints.missing_supports:
+    not touch from u (N,) to there; else None, or LoadStepFailed if a failure is to ``cut`` the
+    increment."""
+    free = system.without_contact
+    if free is None or system.constraints.missing_supports:
         return None
     here = system.recycled(memory, 0.0)
     try:
-        if not (here.starts_apart and not u.any() or here.backend.of(motion_is_clear)(u[None])):
+        if not (here.starts_untouched and not u.any() or here.backend.of(motion_is_clear)(u[None])):
             return None
-        result = solve(apart)
+        result = solve(free)
         return result if _stays_clear(here, u, result.u) else None
     except (LoadStepFailed, ConvergenceError) as failure:
+        if cut and isinstance(failure, LoadStepFailed):
+            raise
         logger.debug("without contact: %s", failure)
         return None
     finally:
