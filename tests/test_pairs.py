@@ -3,6 +3,7 @@
 import copy
 import pickle
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, 
 from skfem.helpers import ddot, sym_grad
 
 from skfem_ancf import (Beam, BodyContact, Domain, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
+                        ElementBeamCable, InputError, MeshBeam, ModelWarning, RigidBody, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.actions.bound import recalled
 from skfem_ancf.actions.contact import contacts, kernels, pairs
 from skfem_ancf.actions.contact.tables import is_clear
@@ -52,6 +54,40 @@ def strips(element, friction=0.0):
         u[0:beams[0].N:beams[0].nd] += 2e-6
     d = layout.sizes * np.random.default_rng(0).standard_normal(layout.N)
     return contact, beams, u.reshape(-1, 2), d.reshape(-1, 2)
+
+
+def crossed(join=lambda scene: None, right=0.5, held=True):
+    """A beam of length 1, one across it at (0.5, 0), and what joins them."""
+    beams = [line(1.0, 8, 0.02), line(0.5 + right, 10, 0.02, (0.5, -0.5), angle=0.5 * np.pi)]
+    scene = Scene(*beams).clamp("left", 0).contact("all")
+    if held:
+        scene.clamp("left", 1)
+    join(scene)
+    return scene
+
+
+@pytest.mark.parametrize("join", [
+    lambda s: s.hinge((0.5, 0)), lambda s: s.weld((0, (0.5, 0)), (1, (0.5, 0))),
+    lambda s: s.spring(1e5, [(0, (0.5, 0)), (1, (0.5, 0))], length=0),
+    lambda s: s.pin((0.5, 0), beam=0).pin((0.5, 0), beam=1)],
+    ids=["hinge", "weld", "spring", "pins"])
+@pytest.mark.parametrize("right", [0.5, 0.0])
+def test_members_that_meet_unjoined_are_said_to(join, right):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ModelWarning)
+        assert crossed(join, right).system
+    with pytest.warns(ModelWarning, match=r"beam 0 meets beam 1 near \(0.49, 0\) in the ref"):
+        assert crossed(right=right).system
+    with pytest.warns(ModelWarning, match="nothing joins them there"):  # joined elsewhere
+        assert crossed(lambda s: s.spring(1e5, [(0, "right"), (1, "left")]), right).system
+
+
+def test_ends_of_a_ring_that_meet_unjoined_are_said_to():
+    a = np.linspace(0.0, 2.0 * np.pi, 33)
+    mesh = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]), a, height=0.02)
+    scene = Scene(Beam(mesh, ELEMENTS[0], STEEL, width=0.02)).contact(0, self_contact=True)
+    with pytest.warns(ModelWarning, match="the beam meets itself near"):
+        assert scene.system
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

@@ -5,6 +5,8 @@ from math import atan, sqrt
 from typing import Any
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from ..actions.contact.contacts import YIELDS
 from ..actions.joints.weld import PrescribedDisplacement
@@ -12,6 +14,7 @@ from ..beam import SNAP, Beam, kinematics
 from ..beam.kinematics import tangents
 from ..core import Array, ModelWarning, StabilityWarning, warn
 from ..equations.evaluation import RANGE
+from ..equations.mobility import who
 from ..equations.stability import response
 from ..materials.base import LinearLaw
 from ..recovery.grids import values_of_domain
@@ -191,6 +194,36 @@ def warn_of_points(system: Any) -> None:
     """Warn of :func:`pushed_points`."""
     for text in pushed_points(system):
         warn(text, ModelWarning)
+
+
+def warn_of_meetings(system: Any) -> None:
+    """Warn of members that meet in the reference configuration where nothing joins them."""
+    elements = system.forces.elements
+    found = [(e, *met) for e in elements if hasattr(e, "broad_search")
+             for met in e.broad_search.meetings()]
+    if not found:
+        return
+    # a graph of DOFs and what connects them: equations, the ground, force elements
+    rows, columns, _ = system.constraints.slopes
+    others = [system.constraints.fixed, *(np.concatenate([link.dofs.ravel() for link in e.links])
+                                          for e in elements if not hasattr(e, "broad_search"))]
+    first = rows.max(initial=-1) + 1
+    rows = np.append(rows, np.repeat(first + np.arange(len(others)), list(map(len, others))))
+    size = system.N + first + len(others)
+    group = connected_components(sparse.coo_array(
+        (np.ones(len(rows)), (np.concatenate([columns, *others]), system.N + rows)),
+        (size, size)), directed=False)[1]
+    for contact, x, parts in found:
+        of_parts = [group[2 * contact.dofs[at][:, None] + (0, 1)] for _, at in parts]
+        if not np.isin(*of_parts).any():
+            x, names = np.round(x + contact.origin, 9) + 0.0, [
+                (who(system.members, k) or " of the beam").removeprefix(" of ") for k, _ in parts]
+            names[1:] = ["itself"] if parts[0][0] == parts[1][0] else names[1:]
+            warn(f"{names[0]} meets {names[1]} near ({x.real:.2g}, {x.imag:.2g}) in the "
+                 "reference configuration, and nothing joins them there: "
+                 f"{contact!r} takes them for joined, and they do not touch within three heights "
+                 "of it. Join them, as by scene.hinge or scene.weld, or move one of them away",
+                 ModelWarning)
 
 
 def pushed_points(system: Any) -> list[str]:

@@ -26,7 +26,7 @@ from ..dynamics.sensors import Sensor, locate
 from ..equations.matrices import (SceneMatrices, linear_external_force, linear_force,
                                   matrices_of)
 from ..equations.system import System
-from ..results.checks import warn_of, warn_of_points
+from ..results.checks import warn_of, warn_of_meetings, warn_of_points
 from ..results.modes import Buckling, FrequencyResponse, Modes
 from ..results.output import scene_html
 from ..results.path import CriticalPoint, Path
@@ -141,6 +141,7 @@ class Scene(Model):
                 self._system.items = self.items
                 # a copy has no equations: with self, memory would wait for a garbage collection
                 self._system.derivatives = partial(Gradient, copy(self))
+                warn_of_meetings(self._system)
             self._system.units = self._units
             return self._system
 

@@ -1,6 +1,6 @@
 """The broad search: which points may touch which facets."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from math import perm
 from typing import Any
@@ -233,6 +233,24 @@ class Search:
         some = self.allowed[members[i], members[j]] & (
             (chains[i] != chains[j]) | (np.abs(s[i] - s[j]) > apart))
         return i[some], j[some]
+
+    def meetings(self) -> Iterator[tuple[complex, list[tuple[int, Array]]]]:
+        """Where parts are taken for joined: the place, and members and DOFs of both."""
+        f, told = self.surfaces.facets, set[tuple[int, ...]]()
+        for spot in self.joined:
+            parts, r = [], spot[1]
+            for chain, s in (spot[:2], spot[2:]):
+                e = np.flatnonzero(f.chains == chain)
+                near = np.abs(s - f.places[e] - 0.5 * f.spans[e]) <= 0.5 * f.spans[e] + self.height
+                axial = f.spans[e] > 0.0  # a body has none
+                parts.append(e[near & axial] if axial.any() else e)
+            if (known := tuple(sorted(int(e[0]) for e in parts))) not in told:
+                told.add(known)
+                e, off = parts[0], np.abs(r - f.places[parts[0]] - 0.5 * f.spans[parts[0]])
+                e = e[off <= off.min() + JOINED * self.height]  # on both sides of the axis
+                at = self.surfaces.along(e, np.clip(2.0 * (r - f.places[e]) / f.spans[e] - 1.0,
+                                                    -1.0, 1.0), 0, np.zeros(f.dofs.max() + 1))
+                yield at.mean(), [(int(f.members[e[0]]), np.unique(f.dofs[e])) for e in parts]
 
     def crossed(self, z: Array) -> complex | None:
         """A place where axes cross, or None."""
