@@ -431,7 +431,7 @@ class State(Immutable, MaterialPoints, Output):
         >>> round(float(by_h[1] * 0.01 / w), 3), round(float(by_E[1] * 2e8 / w), 3)
         (-3.0, -1.0)
         """
-        return self._derivatives(wrt, [J]).of_readings()
+        return self._derivatives(wrt, [J])
 
     def sensitivity(self, wrt: Sequence[Any]) -> list[Array]:
         """Derivatives of all displacements of this static solution by few parameters: a list of
@@ -442,12 +442,12 @@ class State(Immutable, MaterialPoints, Output):
         wrt
             As for :meth:`gradient`.
         """
-        return self._derivatives(wrt).of_displacements()
+        return self._derivatives(wrt)
 
     def _derivatives(self, wrt, readings=()):
         refuse(self.system.derivatives is None, "this state does not know its scene, as after a "
                "pickle: solve it again, or use a skfem_ancf.Design")
-        return self.system.derivatives(self, wrt, readings)
+        return self.system.derivatives(self, wrt, readings).found()
 
     # recovered fields
 
