@@ -342,7 +342,8 @@ class _Page:
         """Forces of supports, and the balance of all forces."""
         state, system, u = self.state, self.system, self.state._acted
         reactions = list(supports_of(state))
-        rows = [(place, *self._forces(*force)) for place, force in reactions]
+        kinds = "force", "force", "moment"
+        rows = [(place, *map(self.number, force, kinds)) for place, force in reactions]
         support = state._support_force()
         inertia, internal = state._inertia + np.zeros_like(u), state.internal_force
         joints = np.zeros_like(u) if not system.constraints.joints else (
@@ -356,7 +357,7 @@ class _Page:
         size = largest or 1.0
         length = float(np.max(np.ptp(np.hstack([b.mesh.p for b in state.beams]), axis=1))
                        ) if state.beams else 1.0
-        shown = [(name, *self._forces(*one)) for name, one in totals.items()
+        shown = [(name, *map(self.number, one, kinds)) for name, one in totals.items()
                  if name in ("loads", "supports") or np.max(
                      np.abs(one / [1, 1, length])) > 1e-9 * size]
         rest = sum(totals.values())
@@ -371,9 +372,6 @@ class _Page:
         head = "along x", "along y", "moment"
         return _table(("support", *head), rows) + _table(
             ("all forces, moments about the origin", *head), shown) + balance
-
-    def _forces(self, x, y, moment):
-        return self.number(x, "force"), self.number(y, "force"), self.number(moment, "moment")
 
     def _extremes(self):
         rows = []

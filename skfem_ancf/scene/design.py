@@ -257,8 +257,8 @@ class Design:
             N, sizes = state.system.N, scene.system.constraints.coordinate_sizes
             for k, z in enumerate(changes_of(state, R).T if functions else ()):
                 largest = np.abs(z[:N] / sizes).max()
-                step = (TOUCHING if state.system.forces.contacts.obstacles else ASIDE) / largest if (
-                    largest > 0.0) else 1.0
+                small = TOUCHING if state.system.forces.contacts.obstacles else ASIDE
+                step = small / largest if largest > 0.0 else 1.0
                 for x, c in STENCIL:
                     moved = State(state.system, state.u + x * step * z[:N], state.load,
                                   memory=state.memory,

@@ -150,7 +150,8 @@ class MotionDesign(Design):
             first, last = (self.history.state(k)._motion for k in (j, j + 1))
             n, between = round((last.t - first.t) / self.dt), list[Motion]()
             if n > 1:  # those between kept states are computed again
-                between = integrator_of(self._built.system, self.scheme).run(first, self.dt, n - 1)
+                between = [*integrator_of(self._built.system, self.scheme).run(
+                    first, self.dt, n - 1)]
                 refuse(len(between) < n - 1, "the steps after t = {:.6g} do not converge a second "
                        "time: give a smaller dt, or every=1", first.t)
             yield from list(pairwise([first, *between, last]))[::order]

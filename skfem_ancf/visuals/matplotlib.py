@@ -202,7 +202,7 @@ def plot_scene(scene: Any, ax: Any = None, *, loads: bool = True, supports: bool
         X, cells = layout(beam, 8, 2)
         which = np.broadcast_to(beam.across.which(np.mean(X[..., cells], axis=-1)), (
             beam.mesh.nelements, len(cells))).ravel()  # the layer of each quad
-        corners = body.points(body.reference, scenery.factor).reshape(2, -1).T[body.cells]
+        corners = body.reference.reshape(2, -1).T[body.cells]
         for k, layer in enumerate(beam.across.layers):
             colour = colours[texts[layer.material]]
             ax.add_collection(PolyCollection(corners[which == k], facecolor=colour, linewidth=0.3,
@@ -218,7 +218,7 @@ def plot_scene(scene: Any, ax: Any = None, *, loads: bool = True, supports: bool
         at = np.hstack([np.zeros((2, 0)), *(beam.mesh.p for beam in state.beams)])
         ax.plot(*at, ".", color=INK, ms=4, zorder=3, gid="node")
     if names:
-        drawn.names(scenery.names)
+        drawn.names(scenery.grids[0])
     frame(ax, scenery, True)
     dress(ax, title, *scenery.axes, scenery.note)
     save(ax)

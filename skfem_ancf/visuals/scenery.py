@@ -39,28 +39,53 @@ INK, MUTED, GHOST, RIGID, WALL = "#222222", "#666666", "#d9d9d9", "#bbbbbb", "#7
 BODIES = "#cfdbe6", "#e8d3a8", "#bcd9b4", "#e3bfc3", "#c9bfe0", "#b5dcd8", "#dcc7b2", "#d5d59e"
 
 
-class _Body:
-    """One beam: reference and deformed positions of grid points and axis, and the field."""
+class _Solid:
+    """A domain: drawn positions of its points, the field there, and quads; triangles repeat a
+    corner."""
 
-    def __init__(self, grid, state, beam, m, field, scale):
-        self.cells, self.height = grid.cells, beam.mesh.height
+    def __init__(self, grid, field):
+        if grid.values is None:
+            raise no_value(field)
+        values = field.of(grid.values)
+        self.values = values if field.components == 1 else np.sqrt(np.sum(values**2, axis=0))
+        self.cells = grid.cells[:, [0, 1, 2, -1]]
+        self.reference, self.deformed = grid.x, grid.x + grid.u
+
+    def outline(self, undeformed):
+        """Edges of the boundary, or of all cells of the reference configuration, (points, 2)."""
+        if undeformed:
+            return list(self.reference.T[self.cells])
+        size = 1e-6 * np.max(np.ptp(self.reference, axis=1))
+        number = np.unique(np.round(self.reference / size), axis=1, return_inverse=True)[1].ravel()
+        ends = np.concatenate([self.cells[:, [k, (k + 1) % 4]] for k in range(4)])
+        ends = ends[number[ends[:, 0]] != number[ends[:, 1]]]
+        _, first, times = np.unique(np.sort(number[ends], axis=1), axis=0, return_index=True,
+                                    return_counts=True)
+        return list(self.deformed.T[ends[first[times == 1]]])
+
+
+class _Body(_Solid):
+    """A beam, with positions (2, nelements, m + 1, rows) once its section is magnified."""
+
+    def __init__(self, grid, field, state, beam, m, scale):
+        super().__init__(grid, field)
+        self.height = beam.mesh.height
         # the axis is at eta = 1/2, which is on the grid only if it has an odd number of rows
         axis = values_on_grid(state, beam, np.array([np.linspace(0, 1, m + 1),
                                                      np.full(m + 1, 0.5)]), False)
         flat = (2, beam.mesh.nelements, m + 1)
         x, u = (y.reshape(*flat, grid.rows) for y in (grid.x, grid.u))
         axis_x, axis_u = (y.reshape(flat) for y in (axis.x, scale * axis.u))
-        self.reference, self.deformed = (x, axis_x), (x + u, axis_x + axis_u)
-        self.values = _values(field, grid)
+        #: Points and axis of both configurations.
+        self.shapes = (x, axis_x), (x + u, axis_x + axis_u)
 
-    def points(self, body, factor):
-        """Positions (2, nelements, m + 1, rows) with the section magnified by ``factor``."""
-        x, axis = body
-        return axis[..., None] + factor * (x - axis[..., None])
+    def magnify(self, factor):
+        self.reference, self.deformed = (
+            axis[..., None] + factor * (x - axis[..., None]) for x, axis in self.shapes)
 
-    def outline(self, body, factor):
+    def outline(self, undeformed):
         """Closed lines around each chain of elements, shape (points, 2)."""
-        x = self.points(body, factor)
+        x = self.reference if undeformed else self.deformed
         cuts = np.nonzero(np.hypot(*(x[:, 1:, 0] - x[:, :-1, -1])).max(axis=-1)
                           > 1e-6 * self.height)[0] + 1
         out = []
@@ -71,44 +96,12 @@ class _Body:
         return out
 
 
-class _Solid:
-    """One domain as a :class:`_Body`: quads; triangles repeat a corner."""
-
-    def __init__(self, grid, field):
-        self.cells = grid.cells[:, [0, 1, 2, -1]]
-        self.reference, self.deformed = grid.x, grid.x + grid.u
-        self.values = _values(field, grid)
-
-    def points(self, body, factor):
-        """Positions (2, n)."""
-        return body
-
-    def outline(self, body, factor):
-        """Edges of the boundary, or of all cells of the reference configuration, (points, 2)."""
-        if body is self.reference:
-            return list(body.T[self.cells])
-        size = 1e-6 * np.max(np.ptp(self.reference, axis=1))
-        number = np.unique(np.round(self.reference / size), axis=1, return_inverse=True)[1].ravel()
-        ends = np.concatenate([self.cells[:, [k, (k + 1) % 4]] for k in range(4)])
-        ends = ends[number[ends[:, 0]] != number[ends[:, 1]]]
-        _, first, times = np.unique(np.sort(number[ends], axis=1), axis=0, return_index=True,
-                                    return_counts=True)
-        return list(body.T[ends[first[times == 1]]])
-
-
-def _values(field, grid):
-    if grid.values is None:
-        raise no_value(field)
-    values = field.of(grid.values)
-    return values if field.components == 1 else np.sqrt(np.sum(values**2, axis=0))
-
-
 def _thickness(thickness, bodies):
     if not (isinstance(thickness, str) and thickness == "auto"):
         return require_positive("thickness", thickness)
     if not bodies:
         return 1.0
-    shapes = [shape for b in bodies for shape in (b.reference, b.deformed)]
+    shapes = [shape for b in bodies for shape in b.shapes]
     every = np.concatenate([axis.reshape(2, -1) for _, axis in shapes], axis=1)
     factor = round(READABLE * np.max(np.ptp(every, axis=1)) / max(b.height for b in bodies))
     for x, axis in shapes:  # both faces keep a third of the advance of the axis
@@ -118,19 +111,6 @@ def _thickness(thickness, bodies):
             turn = -np.sum(offset * step, axis=0) / np.sum(step**2, axis=0)
             factor = min(factor, (2 / 3) // max(np.max(turn), 1e-300))
     return float(max(1, factor))
-
-
-def _scale(scale, found):
-    """Magnification of displacements; 1, 2 or 5 times a power of ten for "auto"."""
-    if not (isinstance(scale, str) and scale == "auto"):
-        return require_positive("scale", scale)
-    size = np.max(np.ptp(np.concatenate([grid.x for grid in found], axis=1), axis=1))
-    largest = max(float(np.max(np.hypot(*grid.u))) for grid in found)
-    if not 1e-12 * size < largest < VISIBLE * size:
-        return 1.0
-    wanted = VISIBLE * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(k for k in (1, 2, 5) if k * power <= wanted * (1 + 1e-9)))
 
 
 def _limits(limits, values, field):
@@ -150,7 +130,7 @@ class Scenery:
     """States of the same beams with one thickness factor and one range of colours. Arguments are
     those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and ``rigid`` are for
     each state its beams and domains, and the grids of its rigid bodies and of domains without the
-    field; ``found`` (n,) the values of all coloured points."""
+    field; ``found`` (n,) the values of all coloured points; ``grids`` are all members."""
 
     #: How far around the bodies obstacles are drawn.
     margin = AROUND
@@ -166,10 +146,20 @@ class Scenery:
         self.frames: list[list[Any]] = []
         self.rigid: list[list[Grid]] = []
         every = [grids(state, subdivide, recover=recover) for state in states]
-        self.scale = _scale(scale, [grid for found in every for grid in found])
+        if isinstance(scale, str) and scale == "auto":  # 1, 2 or 5 times a power of ten
+            both = [grid for found in every for grid in found]
+            size = np.max(np.ptp(np.concatenate([grid.x for grid in both], axis=1), axis=1))
+            largest = max(float(np.max(np.hypot(*grid.u))) for grid in both)
+            scale = 1.0
+            if 1e-12 * size < largest < VISIBLE * size:
+                wanted = VISIBLE * size / largest
+                power = 10.0 ** np.floor(np.log10(wanted))
+                scale = float(power * max(k for k in (1, 2, 5)
+                                          if k * power <= wanted * (1 + 1e-9)))
+        self.scale = require_positive("scale", scale)
         for state, found in zip(states, every):
             found = [grid._replace(u=self.scale * grid.u) for grid in found]
-            self.frames.append([_Body(grid, state, beam, subdivide[0], self.field, self.scale)
+            self.frames.append([_Body(grid, self.field, state, beam, subdivide[0], self.scale)
                                 for grid, beam in zip(found, state.beams)])
             self.rigid.append([])
             for grid in found[len(state.beams):]:
@@ -177,26 +167,18 @@ class Scenery:
                     self.frames[-1].append(_Solid(grid, self.field))
                 except AncfError:  # a rigid body, or the field is not defined there
                     self.rigid[-1].append(grid)
-        self.beams = [body for frame in self.frames for body in frame]
+        bodies = [body for frame in self.frames for body in frame]
         if isinstance(thickness, str) and thickness == "auto" and any(map(may_touch, states)):
             thickness = 1.0  # thicker sections would enter each other
-        self.factor = _thickness(thickness, [b for b in self.beams if isinstance(b, _Body)])
-        self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
+        beams = [body for body in bodies if isinstance(body, _Body)]
+        self.factor = _thickness(thickness, beams)
+        for beam in beams:
+            beam.magnify(self.factor)
+        self.found = np.concatenate([np.zeros(0), *(body.values for body in bodies)])
         if self.found.size and not np.any(np.isfinite(self.found)):
             raise no_value(self.field)
         self.low, self.high = _limits(limits, self.found, self.field)
-        self._states, self._grids = states, every
-
-    @property
-    def names(self) -> list[tuple[str, Array]]:
-        """Names and positions (2,) of the members of the first frame; beams on the axis."""
-        def place(grid):
-            if grid.rows == 1:
-                return grid.x
-            columns = grid.x.reshape(2, grid.elements[-1] + 1, -1, grid.rows)
-            return columns[:, columns.shape[1] // 4, columns.shape[2] // 2]
-
-        return [(grid.name, np.mean(place(grid), axis=1)) for grid in self._grids[0]]
+        self._states, self.grids = states, every
 
     @cached_property
     def every(self) -> Array:
@@ -214,7 +196,7 @@ class Scenery:
     def beam_points(self, frames: Iterable[int], undeformed: bool = False) -> Array:
         """Points of the beams of frames, shape (2, n), deformed or not."""
         return np.concatenate([np.zeros((2, 0)), *(
-            b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
+            (b.reference if undeformed else b.deformed).reshape(2, -1)
             for k in frames for b in self.frames[k])], axis=1)
 
     def points(self, k: int, undeformed: bool = False) -> Array:
@@ -229,8 +211,7 @@ class Scenery:
 
     def outlines(self, k: int, undeformed: bool = False) -> list[Array]:
         """Closed lines around the beams of frame ``k``, shapes (n, 2), deformed or not."""
-        return [line for b in self.frames[k] for line in b.outline(
-            b.reference if undeformed else b.deformed, self.factor)]
+        return [line for b in self.frames[k] for line in b.outline(undeformed)]
 
     def cells(self, frames: Iterable[int] = (0,)) -> Array:
         """Quads of the beams of frames, as rows of points, (nc, 4)."""
@@ -343,8 +324,9 @@ class Sketch:
             elif s.kind in ("support", "joint", "eigenstrain"):
                 key = s.kind, *(np.round(s.at[0].start / self.size, 6) + 0.0)
             before = one.get(key)
-            if s.kind == "support" and before is not None:
-                s = max(before, s, key=_ends)._replace(text=f"{before.text} {s.text}")
+            if s.kind == "support" and before is not None:  # the one with a known direction
+                s = max(before, s, key=lambda one: tuple(one.direction[0]) != (0.0, -1.0))._replace(
+                    text=f"{before.text} {s.text}")
             elif s.kind == "eigenstrain" and s.value:
                 texts = [] if before is None else before.text.split(", ")
                 texts.append(s.text + (f"{s.value:.6g}" if s.show else ""))
@@ -365,10 +347,14 @@ class Sketch:
                 self._beside(f"{s.text}{s.value:.6g}" if mass else s.text, at[0], LOAD if (
                     s.kind in LOADS) else INK if mass else HOLD, s.kind)
 
-    def names(self, places: Iterable[tuple[str, Array]]) -> None:
-        """Write names at positions (2,)."""
-        for name, at in places:
-            self._text(name, at, (1, -1), INK, "name", 10, style="italic")
+    def names(self, members: Iterable[Grid]) -> None:
+        """Write the names of members in their middle; of beams in a section off it."""
+        for grid in members:
+            x = grid.x
+            if grid.rows > 1:
+                columns = x.reshape(2, grid.elements[-1] + 1, -1, grid.rows)
+                x = columns[:, columns.shape[1] // 4, columns.shape[2] // 2]
+            self._text(grid.name, np.mean(x, axis=1), (1, -1), INK, "name", 10, style="italic")
 
     # loads
 
@@ -536,8 +522,3 @@ class Sketch:
             gid=kind, zorder=7, path_effects=[withStroke(linewidth=2, foreground="white")],
             ha="left" if x > 0.4 else "right" if x < -0.4 else "center",
             va="bottom" if y > 0.4 else "top" if y < -0.4 else "center", **options)
-
-
-def _ends(s):
-    """Of two supports the one with a known outward direction."""
-    return tuple(s.direction[0]) != (0.0, -1.0)
