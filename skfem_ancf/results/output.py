@@ -46,11 +46,9 @@ def words(text: str) -> str:
 
 def scene_html(scene: Any) -> str:
     """A table of the items of a Scene, and its reference configuration."""
-    rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
-    rows += [("rigid body", b) for b in scene.bodies]
-    rows += [("domain", d) for d in scene.domains]
-    rows += [("item", one) for one in scene.items]
-    texts = [(kind, " ".join(repr(thing).split())) for kind, thing in rows]
+    things = {"beam": scene.beams, "rigid body": scene.bodies, "domain": scene.domains,
+              "item": scene.items}
+    texts = [(kind, " ".join(repr(one).split())) for kind, some in things.items() for one in some]
     table = "".join(f"<tr><td>{kind}</td><td>" + html.escape(
         text if len(text) <= 160 else text[:157] + "...") + "</td></tr>" for kind, text in texts)
     return (words(repr(scene)[1:-1]) + f"<table>{table}</table>"

@@ -113,19 +113,6 @@ def _thickness(thickness, bodies):
     return float(max(1, factor))
 
 
-def _limits(limits, values, field):
-    require_unmasked("limits", limits)
-    if limits is not None:
-        with retold((TypeError, ValueError), "limits must be two numbers, got {!r}", limits):
-            low, high = limits
-        low, high = require_finite_scalar("limits", low), require_finite_scalar("limits", high)
-        refuse(not low < high, "limits must increase, got {!r}", limits)
-        return low, high
-    start = field.neutral
-    size = np.max(np.abs(values[np.isfinite(values)] - start), initial=0.0) or 1.0
-    return (start - size if field.signed else start), start + size
-
-
 class Scenery:
     """States of the same beams with one thickness factor and one range of colours. Arguments are
     those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and ``rigid`` are for
@@ -177,7 +164,16 @@ class Scenery:
         self.found = np.concatenate([np.zeros(0), *(body.values for body in bodies)])
         if self.found.size and not np.any(np.isfinite(self.found)):
             raise no_value(self.field)
-        self.low, self.high = _limits(limits, self.found, self.field)
+        require_unmasked("limits", limits)
+        if limits is None:
+            start = self.field.neutral
+            size = np.max(np.abs(self.found[np.isfinite(self.found)] - start), initial=0.0) or 1.0
+            self.low, self.high = (start - size if self.field.signed else start), start + size
+        else:
+            with retold((TypeError, ValueError), "limits must be two numbers, got {!r}", limits):
+                low, high = limits
+            self.low, self.high = (require_finite_scalar("limits", x) for x in (low, high))
+            refuse(not self.low < self.high, "limits must increase, got {!r}", limits)
         self._states, self.grids = states, every
 
     @cached_property
@@ -311,6 +307,8 @@ class Sketch:
                  units: tuple[str, str] | None = None) -> None:
         self.ax, self.u, self.points, self.units = ax, u, points, units
         self.size = float(np.max(np.ptp(points, axis=0)))
+        #: The gid of artists.
+        self.kind = ""
         #: Where arrows and texts are.
         self.taken = np.full((1, 2), np.inf)
 
@@ -338,23 +336,25 @@ class Sketch:
             if not s.value and s.kind in LOADS:
                 continue
             at, mass = np.array([place(self.u) for place in s.at]), s.kind == "mass"
+            self.kind = s.kind
             if mark := {"joint": "o" if s.text == "hinge" else "s", "mass": "o",
                         "control": "D"}.get(s.kind):
-                self._mark(mark, at[0], s.kind, INK if mass else "white")
+                self._mark(mark, at[0], INK if mass else "white")
             elif s.kind not in NOTES:
                 getattr(self, "_" + s.kind.replace(" ", "_"))(s, at, largest)
             if s.kind in (*NOTES, "mass", "control", "torsional spring"):
                 self._beside(f"{s.text}{s.value:.6g}" if mass else s.text, at[0], LOAD if (
-                    s.kind in LOADS) else INK if mass else HOLD, s.kind)
+                    s.kind in LOADS) else INK if mass else HOLD)
 
     def names(self, members: Iterable[Grid]) -> None:
         """Write the names of members in their middle; of beams in a section off it."""
+        self.kind = "name"
         for grid in members:
             x = grid.x
             if grid.rows > 1:
                 columns = x.reshape(2, grid.elements[-1] + 1, -1, grid.rows)
                 x = columns[:, columns.shape[1] // 4, columns.shape[2] // 2]
-            self._text(grid.name, np.mean(x, axis=1), (1, -1), INK, "name", 10, style="italic")
+            self._text(grid.name, np.mean(x, axis=1), (1, -1), INK, 10, style="italic")
 
     # loads
 
@@ -376,14 +376,13 @@ class Sketch:
         k = [*clear, *order][0] if np.ptp(sizes) < 1e-9 else int(np.argmax(sizes))
         for tip, tail in zip(tips, tails):
             if np.hypot(*(tip - tail)) > 0.005 * self.size:
-                self._arrow(tail, tip, kind=s.kind)
+                self._arrow(tail, tip)
         if len(at) > 1:
-            self._line(tails, s.kind, LOAD, 0.8)
+            self._line(tails, LOAD, 0.8)
             self.taken = np.vstack([self.taken, 0.5 * (tails[1:] + tails[:-1])])
         if s.show:
             free, other = (tips[0], tails[0]) if tips is out else (tails[k], tips[k])
-            self._text(self._value(s), free,
-                       free - other, LOAD, s.kind)
+            self._text(self._value(s), free, free - other, LOAD)
 
     def _value(self, s):
         """Text and value, with the unit of a force or moment."""
@@ -394,19 +393,19 @@ class Sketch:
         """One arrow to the right of the picture for all members of one gravity."""
         foot = np.max(self.points, axis=0) + [0.2 * self.size, 0.0]
         tip = foot + ARROW * self.size * np.array(s.direction[0]) * np.sign(s.value)
-        self._arrow(foot, tip, kind=s.kind, color=MUTED)
-        self._text(s.text + rounded(abs(s.value), ""), tip, tip - foot, MUTED, s.kind)
+        self._arrow(foot, tip, color=MUTED)
+        self._text(s.text + rounded(abs(s.value), ""), tip, tip - foot, MUTED)
 
     def _moment(self, s, at, largest):
         motor, color = s.kind == "motor", HOLD if s.kind == "motor" else LOAD
         angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
         arc = at[0] + 1.5 * SIZE * self.size * np.column_stack([np.cos(angle), np.sin(angle)])
-        self._arrow(*arc, kind=s.kind, color=color)
-        self._beside("angle(t)" if motor else s.text or self._value(s), at[0], color, s.kind)
+        self._arrow(*arc, color=color)
+        self._beside("angle(t)" if motor else s.text or self._value(s), at[0], color)
 
     _motor = _moment
 
-    def _beside(self, text, at, color, kind):
+    def _beside(self, text, at, color):
         """Write in a corner about a position, far from bodies and other texts."""
         r = 1.1 * SIZE * self.size
 
@@ -418,7 +417,7 @@ class Sketch:
 
         far, away = max([(k, (x, y)) for k in (1, 2, 3) for y in (1, -1) for x in (1, -1)],
                         key=room)
-        self._text(text, at + far * r * np.array(away), away, color, kind)
+        self._text(text, at + far * r * np.array(away), away, color)
 
     def _box(self, text, at, away):
         x, y = np.array(away) / (np.hypot(*away) or 1.0)
@@ -434,7 +433,7 @@ class Sketch:
         held, base, r = set(s.text.split()), at[0], SIZE * self.size
         single, (x, y) = {"x", "y"} - held, s.direction[0]
         if len(single) == 2:
-            return self._mark("s", base, s.kind)
+            return self._mark("s", base)
         if single or "angle" not in held:  # upright, or sideways where only x is held
             x, y = (0.0, 1.0 if y > 0.7 else -1.0) if "y" in held else (1.0 if x > 0.7 else -1.0, 0)
         d, across, wide = np.array([x, y]), np.array([-y, x]), 1.2 * r
@@ -445,25 +444,25 @@ class Sketch:
             wide = max(wide, 1.3 * half * (half < 0.15 * self.size))
         if "angle" not in held:
             base = base + 1.5 * r * d
-            self._line([at[0], base + 0.8 * r * across, base - 0.8 * r * across, at[0]], s.kind)
+            self._line([at[0], base + 0.8 * r * across, base - 0.8 * r * across, at[0]])
         elif single:
-            self._line([base - wide * across, base + wide * across], s.kind)
-        self._ground(base + 0.4 * r * d * len(single), d, wide, s.kind)
+            self._line([base - wide * across, base + wide * across])
+        self._ground(base + 0.4 * r * d * len(single), d, wide)
 
-    def _ground(self, foot, d, wide, kind):
+    def _ground(self, foot, d, wide):
         """A line across d with hatching behind it."""
         across, r = np.array([-d[1], d[0]]), SIZE * self.size
-        self._line([foot - wide * across, foot + wide * across], kind)
+        self._line([foot - wide * across, foot + wide * across])
         for k in np.linspace(-wide, wide - 0.4 * r, max(6, round(2 * wide / r))):
             at = foot + k * across
-            self._line([at, at + 0.45 * r * (d - across)], kind, HOLD, 0.8)
+            self._line([at, at + 0.45 * r * (d - across)], HOLD, 0.8)
 
     def _slider(self, s, at, largest):
         d, r = np.array(s.direction[0]), SIZE * self.size
         for side in (-0.6, 0.6):
             foot = at[0] + side * r * np.array([-d[1], d[0]])
-            self._line([foot - 1.5 * r * d, foot + 1.5 * r * d], s.kind)
-        self._mark("o", at[0], s.kind)
+            self._line([foot - 1.5 * r * d, foot + 1.5 * r * d])
+        self._mark("o", at[0])
 
     def _spring(self, s, at, largest):
         a, b = at
@@ -473,44 +472,44 @@ class Sketch:
             across = np.array([-along[1], along[0]]) / length
             x = np.array([0, 0.2, *np.linspace(0.25, 0.75, 8), 0.8, 1])
             y = np.array([0, 0, *np.tile([1, -1], 4), 0, 0])
-            self._line(a + np.outer(x, along) + r * np.outer(y, across), s.kind)
+            self._line(a + np.outer(x, along) + r * np.outer(y, across))
             for place, end, outwards in zip(s.at, at, (-along, along)):
                 if not place.dofs.size:
-                    self._ground(end, outwards / length, 1.2 * r, s.kind)
+                    self._ground(end, outwards / length, 1.2 * r)
             if s.text:
-                self._text(s.text, 0.5 * (a + b) + r * across, across, HOLD, s.kind)
+                self._text(s.text, 0.5 * (a + b) + r * across, across, HOLD)
 
     def _foundation(self, s, at, largest):
         foot = at[0] + 2 * SIZE * self.size * np.array(s.direction[0])
         self._spring(s._replace(at=(s.at[0], Vector(foot)), text=""), [at[0], foot], largest)
         if s.text:
-            self._text(s.text, foot, s.direction[0], HOLD, s.kind, 8)
+            self._text(s.text, foot, s.direction[0], HOLD, 8)
 
     def _torsional_spring(self, s, at, largest):
         angle = np.linspace(0, 4 * np.pi, 60)
         spiral = SIZE * self.size * angle / angle[-1] * [np.cos(angle), np.sin(angle)]
-        self._line(at[0] + spiral.T, s.kind)
+        self._line(at[0] + spiral.T)
 
     # artists
 
-    def _arrow(self, *points, kind, color=LOAD):
+    def _arrow(self, *points, color=LOAD):
         from matplotlib.patches import FancyArrowPatch
         from matplotlib.path import Path
 
         self.ax.add_patch(FancyArrowPatch(
             path=Path(points), arrowstyle="-|>", mutation_scale=9, color=color, lw=1.2, zorder=5,
-            gid=kind))
+            gid=self.kind))
         self.ax.update_datalim(points)
         self.taken = np.vstack([self.taken, points, 0.5 * np.add(points[0], points[-1])])
 
-    def _line(self, points, kind, color=HOLD, lw=1.2):
-        self.ax.plot(*np.transpose(points), color=color, lw=lw, zorder=4, gid=kind,
+    def _line(self, points, color=HOLD, lw=1.2):
+        self.ax.plot(*np.transpose(points), color=color, lw=lw, zorder=4, gid=self.kind,
                      solid_capstyle="round")
 
-    def _mark(self, marker, at, kind, face="white"):
-        self.ax.plot(*at, marker, mfc=face, mec=HOLD, ms=6, mew=1.2, zorder=6, gid=kind)
+    def _mark(self, marker, at, face="white"):
+        self.ax.plot(*at, marker, mfc=face, mec=HOLD, ms=6, mew=1.2, zorder=6, gid=self.kind)
 
-    def _text(self, text, at, away, color, kind, far=4, **options):
+    def _text(self, text, at, away, color, far=4, **options):
         from matplotlib.patheffects import withStroke
 
         x, y = np.array(away) / (np.hypot(*away) or 1.0)
@@ -519,6 +518,6 @@ class Sketch:
         self.taken = np.vstack([self.taken, box])
         self.ax.annotate(
             text, at, (far * x, far * y), textcoords="offset points", fontsize=8, color=color,
-            gid=kind, zorder=7, path_effects=[withStroke(linewidth=2, foreground="white")],
+            gid=self.kind, zorder=7, path_effects=[withStroke(linewidth=2, foreground="white")],
             ha="left" if x > 0.4 else "right" if x < -0.4 else "center",
             va="bottom" if y > 0.4 else "top" if y < -0.4 else "center", **options)
