@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam import Beam, Domain, Layout, WhichMember, select_member
+from ..beam import Beam, Domain, Layout, WhichMember
 from ..core import (AncfError, Array, CallbackError, InputError, StrPath, output_file, require_flag,
                     require_integer, require_path, require_text)
 from ..io import save_vtu, to_xarray
@@ -489,8 +489,8 @@ class Output:
         recover, count = require_flag("recover", recover), require_integer("count", count, 1)
         wanted = find_field(field, DRAWN)
         members = state.system.members
-        beams = [one for one in members if isinstance(one, (Beam, Domain))] if beam is None else [
-            select_member(state.beams, members[len(state.beams):], beam)]
+        beams = [state._member(beam)] if beam is not None else [
+            one for one in members if isinstance(one, (Beam, Domain))]
         total = sum(b.mesh.nelements for b in beams if isinstance(b, Beam))
         m = int(np.clip(POINTS // max(1, total), FEW, MANY))
         found: list[tuple[Extreme, float]] = []
