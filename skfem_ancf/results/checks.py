@@ -28,7 +28,6 @@ TURNING_SMOOTH = 2.5
 HOOKE, UNITS = 0.03, 10.0
 #: Largest rotation in linear theory, in radians, with an error of about 1 %.
 SMALL = 0.1
-TINY = 1e-300
 #: Least ratio of lateral to normal force of a checked kink, and least length of the kink due to
 #: bending stiffness, relative to an element.
 KINKED, FOLLOWED = 0.05, 0.3
