@@ -15,7 +15,7 @@ from .types import Array, ArrayLike, Law, Place, Rule, StrPath, TimeFunction
 from .immutable import (Immutable, array_cache, cached_property, is_builtin, picklable, read_only,
                         rebuilt)
 from .quadrature import gauss, gauss_lobatto, hermite_basis, lagrange, product_rule, tensor
-from .linear import angle_of, first_order, largest, step, stress_of, unwrapped
+from .linear import angle_of, first_order, step, stress_of, unwrapped
 from .archive import output_file
 from .band import Band, BandMatrix, Inertia
 from .callbacks import (call_custom, call_loaded, call_solver, custom_distance, deferred, handle_of,

@@ -37,12 +37,6 @@ def first_order(z: Any) -> Any:
     return z.real + z.imag / STEP if np.iscomplexobj(z) else z
 
 
-def largest(z: Array, axis: Any = None) -> Any:
-    """Largest modulus, along axes; at a :func:`step` that of the change, without round-off."""
-    change = z.imag / STEP if z.dtype.kind == "c" else z
-    return np.maximum.reduce(np.abs(change), axis=axis)
-
-
 def angle_of(x: Any, y: Any) -> Any:
     """``arctan2(y, x)`` in radians, also for a :func:`step`."""
     if not np.iscomplexobj(x):

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.shapes import around, outlines
-from ..beam import select_member
 from ..core import (InputError, StrPath, output_file, refuse, require_finite_scalar, require_flag,
                     require_like, require_module, require_option, require_path, require_text)
 from ..recovery.fields import FIELDS, find_fields, unit_of, units_of
@@ -358,10 +357,9 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
 
 def _of_body(state, wanted, subdivide, recover, lenient, beam):
     """Coordinates of points all over the body, or over one beam, and fields by name."""
-    found, members = grids(state, subdivide, False, recover), state.system.members
+    found = grids(state, subdivide, False, recover)
     if beam is not None:
-        one = select_member(state.beams, members[len(state.beams):], beam)
-        found = [grid for grid, member in zip(found, members) if member is one]
+        found = [found[state.system.members.index(state._member(beam))]]
     bodies = [body_of(grid, wanted, True, lenient, share=False) for grid in found]
     x = np.concatenate([body.points for body in bodies]).T
     names = np.repeat([grid.name for grid in found], [len(body.points) for body in bodies])

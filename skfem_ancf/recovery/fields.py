@@ -148,6 +148,8 @@ class Values(Mapping):
         #: Linear about the reference configuration.
         self._small = np.iscomplexobj(u) and not u.real.any()
         self._known: dict[str, Array] = {}
+        #: True for a section of which only stiffnesses are known: it has no stress.
+        self._shapeless = not self.beam.section.has_fields
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._known:
@@ -184,11 +186,6 @@ class Values(Mapping):
     @property
     def _remembers(self):
         return remembers(self.beam)
-
-    @property
-    def _shapeless(self):
-        """True for a section of which only stiffnesses are known: it has no stress."""
-        return not self.beam.section.has_fields
 
     @cached_property
     def S(self) -> Array:

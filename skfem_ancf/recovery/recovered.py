@@ -31,7 +31,8 @@ from scipy.linalg.lapack import dgttrf, dgttrs, dpttrf, dpttrs
 
 from ..beam import AXIS, SNAP, remembers
 from ..beam.strains import on_grid, stress_at
-from ..core import Array, angle_of, cached_property, first_order, largest, unwrapped
+from ..core import Array, angle_of, cached_property, first_order, unwrapped
+from ..core.linear import STEP
 from ..formulations import EnhancedContinuum
 from ..materials import LinearLaw
 from ..mesh.mapping import cross
@@ -50,9 +51,6 @@ AT_CUT = 1e-8
 #: slowly.
 ROUNDS, SETTLED = 6, 1e-7
 MOST, SLOWLY = 30, 1e-4
-
-#: The axes of sections and points across, behind that of several instants.
-EACH = (-2, -1)
 
 #: Fraction of an element next to a load or joint that has no sections. If it is the whole segment,
 #: the sections are those of the whole element.
@@ -139,8 +137,9 @@ class Segment:
     Of several instants together, the fields have an axis of the instants before n."""
 
     def __init__(self, recovery: Any, start: float, end: float) -> None:
-        self.recovery, self.forces = recovery, recovery.forces
-        self.beam, self.height = recovery.beam, recovery.beam.mesh.height
+        self.recovery, self.forces, r = recovery, recovery.forces, recovery
+        self.beam, self.height = r.beam, r.beam.mesh.height
+        across, mapping = r.beam.across, r.beam.mesh.mapping()
         #: Sections of cables keep their height when the axis is stretched.
         self.rigid = not self.beam.has_sections
         e = np.arange(int(np.floor(start)), int(np.ceil(end)))
@@ -152,37 +151,14 @@ class Segment:
             a, b = 0.0 * a, 0.0 * b + 1.0
         whole = (a == 0) & (b == 1)
         self.elements = e[whole] if whole.any() else e
-        self.e = np.append(np.repeat(e, 2), e[-1])
+        self.e = e = np.append(np.repeat(e, 2), e[-1])
         xi = np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
-        self._geometry(self.e, xi)
-        self.R, self.M = self.forces.at(self.e, xi, np.full(len(xi), start))
+        self.s = r.arc.at(e, xi)
+        self.R, self.M = self.forces.at(e, xi, np.full(len(xi), start))
         if self.forces.viscous is not None:
             self.Rv, self.Mv = (self._at_sections(x[..., self.elements], np.array([0.5]))
                                 for x in self.forces.viscous_middles())
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
-        self._solve()
-
-    def part(self, k: int) -> "Segment":
-        """The segment at instant k of several."""
-        one = copy.copy(self)
-        vars(one).pop("result", None)
-        one.strain, one.stress = self.strain[:, k], self.stress[:, k]
-        for name in ("angle", "stretch", "rate", "change"):
-            setattr(one, name, getattr(self, name)[k])
-        return one
-
-    def _at_sections(self, values, xi):
-        """Spline at the sections through values (..., k) at xi (p,) of the elements, k = n p."""
-        e = self.elements
-        s = self.recovery.arc.at(np.repeat(e, len(xi)), np.tile(xi, len(e)))
-        if len(s) == 1:
-            return values + np.zeros(len(self.s))
-        return scipy.interpolate.CubicSpline(s, values, axis=-1)(self.s)
-
-    def _geometry(self, e, xi):
-        """Set points, stiffness and loads of the sections."""
-        r, across, mapping = self.recovery, self.beam.across, self.beam.mesh.mapping()
-        self.s = r.arc.at(e, xi)
         moved = np.zeros(len(xi))  # loads may jump at ends inside elements
         moved[0], moved[-1] = SIDE, -SIDE
         xi = xi + moved * ((xi > 0.0) & (xi < 1.0))
@@ -218,6 +194,24 @@ class Segment:
         s = self.s - self.s.mean()
         #: Symmetric matrix of the least-squares line through values (n,).
         self._line = s[:, None] * s / (s @ s) + 1.0 / len(s)
+        self._solve()
+
+    def part(self, k: int) -> "Segment":
+        """The segment at instant k of several."""
+        one = copy.copy(self)
+        vars(one).pop("result", None)
+        one.strain, one.stress = self.strain[:, k], self.stress[:, k]
+        for name in ("angle", "stretch", "rate", "change"):
+            setattr(one, name, getattr(self, name)[k])
+        return one
+
+    def _at_sections(self, values, xi):
+        """Spline at the sections through values (..., k) at xi (p,) of the elements, k = n p."""
+        e = self.elements
+        s = self.recovery.arc.at(np.repeat(e, len(xi)), np.tile(xi, len(e)))
+        if len(s) == 1:
+            return values + np.zeros(len(self.s))
+        return scipy.interpolate.CubicSpline(s, values, axis=-1)(self.s)
 
     # along the axis and across
 
@@ -319,7 +313,7 @@ class Segment:
             self.stretch = self.stretch + change
             if self.stress_given:
                 self.S[0] += E * self.stretch * change
-            if (largest(change, EACH) < 1e-12 * largest(self.eps[0], EACH)).all():
+            if (_largest(change) < 1e-12 * _largest(self.eps[0])).all():
                 break
 
     def _turn(self):
@@ -392,8 +386,8 @@ class Segment:
             self.S = np.array([self.S[0], cross(self.rX, P2) / det,
                                cross(P2, self.rY) / det - viscous[1]])
             self._shear()
-            self.change = largest(self.stretch - before, EACH)
-            if (self.change <= largest(self.stretch - 1.0, EACH) * (
+            self.change = _largest(self.stretch - before)
+            if (self.change <= _largest(self.stretch - 1.0) * (
                     SETTLED if k < ROUNDS - 1 else SLOWLY)).all():
                 break
         self._balance()
@@ -442,6 +436,13 @@ def _arcsin(x):
     return np.arcsin(np.minimum(np.maximum(x, -1.0), 1.0))
 
 
+def _largest(z):
+    """Largest modulus over sections and points across, the last axes; of a complex step that of
+    the change, without round-off."""
+    change = z.imag / STEP if z.dtype.kind == "c" else z
+    return np.maximum.reduce(np.abs(change), axis=(-2, -1))
+
+
 def _turned(f, angle):
     """Components of vectors (2, ...) along angles and normal to them."""
     c, s = np.cos(angle), np.sin(angle)
@@ -485,7 +486,7 @@ class Recovery:
             return
         try:
             self.segments = [Segment(self, a, b) for a, b in pairwise(self.forces.cuts)]
-            strain = np.max([largest(one.stretch - 1.0, EACH) for one in self.segments], axis=0)
+            strain = np.max([_largest(one.stretch - 1.0) for one in self.segments], axis=0)
             change = np.max(np.max([one.change for one in self.segments], axis=0)
                             / np.maximum(strain, TINY))
             if change > UNSETTLED:

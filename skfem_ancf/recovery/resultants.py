@@ -139,10 +139,16 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
     # loads of eigenstrains. Sections are elements and xi ``at``, or all of the beam or one chain,
     # ``sections`` in each element.
     if at is None:
-        e, xi, after = _everywhere(beam, [] if recovery is None else recovery.forces.cuts, sections)
+        # with both sides of cuts inside elements
+        cuts = np.zeros(0) if recovery is None else recovery.forces.cuts
+        ne, inside = beam.mesh.nelements, cuts[cuts % 1.0 != 0.0]
+        e = np.append(np.repeat(np.arange(ne), sections), np.repeat(inside.astype(int), 2))
+        xi = np.append(np.tile(np.linspace(0.0, 1.0, sections), ne), np.repeat(inside % 1.0, 2))
+        after = np.append(np.zeros(ne * sections, dtype=bool), np.tile([False, True], len(inside)))
+        on = np.lexsort((after, xi, e))
         if chain is not None:
-            on = beam.mesh.chains[e] == chain
-            e, xi, after = e[on], xi[on], after[on]
+            on = on[beam.mesh.chains[e[on]] == chain]
+        e, xi, after = e[on], xi[on], after[on]
     else:
         (e, xi), after = at, np.zeros(len(at[0]), dtype=bool)
     if recovery is not None:
@@ -187,18 +193,6 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
 
 def _on_axis(xi):
     return np.array([xi, 0.5 + 0.0 * xi])[:, :, None]
-
-
-def _everywhere(beam, cuts, n):
-    """``n`` sections of all elements, with both sides of interior cuts."""
-    ne = beam.mesh.nelements
-    inside = np.array([cut for cut in cuts if cut % 1.0])
-    e = np.append(np.repeat(np.arange(ne), n), np.repeat(inside.astype(int), 2))
-    xi = np.append(np.tile(np.linspace(0.0, 1.0, n), ne), np.repeat(inside % 1.0, 2))
-    after = np.append(np.zeros(ne * n, dtype=bool),
-                      np.tile([False, True], len(inside)))
-    order = np.lexsort((after, xi, e))
-    return e[order], xi[order], after[order]
 
 
 def _result(R, M, angle, stretch, shear, curvature):

@@ -79,13 +79,9 @@ class Interval(NamedTuple):
     low: float
     high: float
     curved: bool
-    nodes: Array
+    nodes: Array  # s
+    eta: Array
     inverse: Array  # (n, n) from values at the nodes to coefficients of Chebyshev polynomials
-
-    @property
-    def eta(self) -> Array:
-        s = 0.5 - 0.5 * np.cos(np.pi * self.nodes) if self.curved else self.nodes
-        return self.low + (self.high - self.low) * s
 
     def local(self, eta: Array) -> Array:
         s = (eta - self.low) / (self.high - self.low)
@@ -94,14 +90,6 @@ class Interval(NamedTuple):
     def weights(self, s: Array) -> Array:
         """Interpolation weights from the nodes to points s (...), shape (..., n)."""
         return chebvander(2.0 * s - 1.0, len(self.nodes) - 1) @ self.inverse
-
-    def integrals(self, ends: Array) -> Array:
-        """Weights (k, n) of the integrals over eta from s = 0 to ends (k,)."""
-        x, w = gauss(len(self.nodes) * (2 if self.curved else 1))
-        s = ends[:, None] * x
-        slope = 0.5 * np.pi * np.sin(np.pi * s) if self.curved else 1.0 + 0.0 * s
-        w = ends[:, None] * w * slope
-        return (self.high - self.low) * (w[:, None] @ self.weights(s))[:, 0]
 
 
 class AcrossPoints(NamedTuple):
@@ -132,8 +120,9 @@ class Intervals:
                 n = max(ACROSS, 2 * order + 1)
                 nodes = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, n))
                 nodes[n // 2] = 0.5
-            self._intervals.append(Interval(low, high, curved, nodes, np.linalg.inv(
-                chebvander(2.0 * nodes - 1.0, n - 1))))
+            s = 0.5 - 0.5 * np.cos(np.pi * nodes) if curved else nodes
+            self._intervals.append(Interval(low, high, curved, nodes, low + (high - low) * s,
+                                            np.linalg.inv(chebvander(2.0 * nodes - 1.0, n - 1))))
         ends = np.cumsum([0] + [len(i.nodes) for i in self._intervals])
         self._columns = [slice(a, b) for a, b in pairwise(ends.tolist())]
         counts = np.cumsum([0] + [len(m.pieces) for m in self._measures])
@@ -167,8 +156,12 @@ class Intervals:
         """Weights (k, m) of the integrals from the bottom to eta."""
         which, out = self._which(eta), np.zeros((len(eta), len(self.eta)))
         for k, (i, columns) in enumerate(zip(self._intervals, self._columns)):
-            s = np.where(which > k, 1.0, i.local(np.clip(eta, i.low, i.high)))
-            out[:, columns] = np.where(which[:, None] < k, 0.0, i.integrals(s))
+            end = np.where(which > k, 1.0, i.local(np.clip(eta, i.low, i.high)))[:, None]
+            x, w = gauss(len(i.nodes) * (2 if i.curved else 1))
+            s = end * x
+            w = end * w * (0.5 * np.pi * np.sin(np.pi * s) if i.curved else 1.0 + 0.0 * s)
+            out[:, columns] = np.where(which[:, None] < k, 0.0, (i.high - i.low) * (
+                w[:, None] @ i.weights(s))[:, 0])
         return out
 
     def _ends_at(self, h):

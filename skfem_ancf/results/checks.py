@@ -12,7 +12,7 @@ from ..actions.contact.contacts import YIELDS
 from ..actions.joints.weld import PrescribedDisplacement
 from ..beam import SNAP, Beam, kinematics
 from ..beam.kinematics import tangents
-from ..core import Array, ModelWarning, StabilityWarning, warn
+from ..core import ModelWarning, StabilityWarning, warn
 from ..equations.evaluation import RANGE
 from ..equations.mobility import who
 from ..equations.stability import response
@@ -31,7 +31,6 @@ TURNING_SMOOTH = 2.5
 HOOKE, UNITS = 0.03, 10.0
 #: Largest rotation in linear theory, in radians, with an error of about 1 %.
 SMALL = 0.1
-TINY = 1e-300
 #: Least ratio of lateral to normal force of a checked kink, and least length of the kink due to
 #: bending stiffness, relative to an element.
 KINKED, FOLLOWED = 0.05, 0.3
@@ -86,17 +85,23 @@ def check(state: Any) -> Checks:
     for beam in state.beams:
         u, base = state.u_of(beam), None if state.base is None else state.base.u_of(beam)
         ratio, stretches = kinematics.deformation(beam, state._places[state.system.of(beam)])
-        values.append((np.min(ratio), np.min(stretches), np.max(stretches),
-                       turning(beam, u, base)))
+        least, most = np.min(stretches), np.max(stretches)
         if base is None:
-            _, least, most, by = values[-1]
-            found += _findings(beam, least, by)
+            bent = kinematics.bent(beam, u)[0]
+            found += _findings(beam, least, bent)
             if not state._eigenstrains(beam):
                 found += _strained(beam, beam.kernel.linear, least, most)
-        elif (by := np.max(np.abs(_turns(beam, u, base) - _turns(beam, base)))) > SMALL:
-            found.append(
-                f"the axis{_of(beam)} turns by {by:.3g} rad, and what is linear leaves out what "
-                f"is of the order of the square of that; beyond {SMALL:g} rad use solve_static()")
+        else:  # turns of the nodes, linear about the base
+            start = tangents(beam, base)
+            turns, (left, right) = (tangents(beam, u) / start).imag, beam.mesh.t
+            before = np.angle(start / tangents(beam, 0.0))
+            bent = np.max(np.abs((before + turns)[right] - (before + turns)[left]))
+            if (by := np.max(np.abs(turns))) > SMALL:
+                found.append(
+                    f"the axis{_of(beam)} turns by {by:.3g} rad, and what is linear leaves out "
+                    "what is of the order of the square of that; beyond "
+                    f"{SMALL:g} rad use solve_static()")
+        values.append((np.min(ratio), least, most, bent))
     for domain in state.system.domains if state.base is None else ():
         v = values_of_domain(state, domain)[0]
         stretches = np.sqrt(np.maximum(1.0 + 2.0 * v.principal[0], 0.0))
@@ -186,7 +191,8 @@ def warn_of(state: Any) -> None:
         u = state.u[s]
         shortest = 1.0 if beam.has_sections and not beam.kernel.linear else (
             kinematics.shortest(beam, u))
-        for text in _findings(beam, shortest, 0.0 if state._seen else turning(beam, u)):
+        for text in _findings(beam, shortest, 0.0 if state._seen else (
+                kinematics.bent(beam, u)[0])):
             warn(f"{text} (state.checks has the numbers)", ModelWarning)
 
 
@@ -322,17 +328,3 @@ def _strained(member, hooke, low, high):
            "yield before (ElasticPlastic); for rubber use NeoHookean" if hooke else "")
     return [f"the strain{_of(member)} is {strain:.3g}{law}. Are E and the lengths in the same "
             "units, as Pa and m, or MPa and mm?"]
-
-
-def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
-    """Largest rotation of the axis over an element, from its tangents at the nodes."""
-    if base is None:
-        return kinematics.bent(beam, u)[0]
-    (left, right), turns = beam.mesh.t, _turns(beam, u, base)
-    return float(np.max(np.abs(turns[right] - turns[left])))
-
-
-def _turns(beam, u, base=None):
-    start = tangents(beam, u if base is None else base)
-    turns = np.angle(start / tangents(beam, 0.0))
-    return turns if base is None else turns + (tangents(beam, u) / start).imag

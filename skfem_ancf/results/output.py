@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam import Beam, Domain, Layout, WhichMember, select_member
+from ..beam import Beam, Domain, Layout, WhichMember
 from ..core import (AncfError, Array, CallbackError, InputError, StrPath, output_file, require_flag,
                     require_integer, require_path, require_text)
 from ..io import save_vtu, to_xarray
@@ -46,11 +46,9 @@ def words(text: str) -> str:
 
 def scene_html(scene: Any) -> str:
     """A table of the items of a Scene, and its reference configuration."""
-    rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
-    rows += [("rigid body", b) for b in scene.bodies]
-    rows += [("domain", d) for d in scene.domains]
-    rows += [("item", one) for one in scene.items]
-    texts = [(kind, " ".join(repr(thing).split())) for kind, thing in rows]
+    things = {"beam": scene.beams, "rigid body": scene.bodies, "domain": scene.domains,
+              "item": scene.items}
+    texts = [(kind, " ".join(repr(one).split())) for kind, some in things.items() for one in some]
     table = "".join(f"<tr><td>{kind}</td><td>" + html.escape(
         text if len(text) <= 160 else text[:157] + "...") + "</td></tr>" for kind, text in texts)
     return (words(repr(scene)[1:-1]) + f"<table>{table}</table>"
@@ -342,7 +340,8 @@ class _Page:
         """Forces of supports, and the balance of all forces."""
         state, system, u = self.state, self.system, self.state._acted
         reactions = list(supports_of(state))
-        rows = [(place, *self._forces(*force)) for place, force in reactions]
+        kinds = "force", "force", "moment"
+        rows = [(place, *map(self.number, force, kinds)) for place, force in reactions]
         support = state._support_force()
         inertia, internal = state._inertia + np.zeros_like(u), state.internal_force
         joints = np.zeros_like(u) if not system.constraints.joints else (
@@ -356,7 +355,7 @@ class _Page:
         size = largest or 1.0
         length = float(np.max(np.ptp(np.hstack([b.mesh.p for b in state.beams]), axis=1))
                        ) if state.beams else 1.0
-        shown = [(name, *self._forces(*one)) for name, one in totals.items()
+        shown = [(name, *map(self.number, one, kinds)) for name, one in totals.items()
                  if name in ("loads", "supports") or np.max(
                      np.abs(one / [1, 1, length])) > 1e-9 * size]
         rest = sum(totals.values())
@@ -371,9 +370,6 @@ class _Page:
         head = "along x", "along y", "moment"
         return _table(("support", *head), rows) + _table(
             ("all forces, moments about the origin", *head), shown) + balance
-
-    def _forces(self, x, y, moment):
-        return self.number(x, "force"), self.number(y, "force"), self.number(moment, "moment")
 
     def _extremes(self):
         rows = []
@@ -493,8 +489,8 @@ class Output:
         recover, count = require_flag("recover", recover), require_integer("count", count, 1)
         wanted = find_field(field, DRAWN)
         members = state.system.members
-        beams = [one for one in members if isinstance(one, (Beam, Domain))] if beam is None else [
-            select_member(state.beams, members[len(state.beams):], beam)]
+        beams = [state._member(beam)] if beam is not None else [
+            one for one in members if isinstance(one, (Beam, Domain))]
         total = sum(b.mesh.nelements for b in beams if isinstance(b, Beam))
         m = int(np.clip(POINTS // max(1, total), FEW, MANY))
         found: list[tuple[Extreme, float]] = []

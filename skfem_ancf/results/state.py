@@ -62,14 +62,13 @@ class MaterialPoints(NearMisses):
     def _places(self) -> Array:
         return self.u
 
-    def _dofs(self, member):
+    def _member(self, which: WhichMember) -> Any:
         system = self.system
-        return system.of(select_member(system.beams, system.members[len(system.beams):],
-                                       member))
+        return select_member(system.beams, system.members[len(system.beams):], which)
 
     def u_of(self, beam: WhichMember) -> Array:
         """Displacements of the DOFs (..., n) of one beam or rigid body."""
-        return self.u[..., self._dofs(beam)]
+        return self.u[..., self.system.of(self._member(beam))]
 
     def displacement(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Displacement of material points, (..., 2) or (..., 2, n); MeshError outside the body."""
@@ -315,7 +314,7 @@ class State(Immutable, MaterialPoints, Output):
         return self.u if self.base is None else step(self.base.u, self.u)
 
     def _places_of(self, beam):
-        return self._places[self._dofs(beam)]
+        return self._places[self.system.of(self._member(beam))]
 
     @property
     def _unit(self):
@@ -431,7 +430,7 @@ class State(Immutable, MaterialPoints, Output):
         >>> round(float(by_h[1] * 0.01 / w), 3), round(float(by_E[1] * 2e8 / w), 3)
         (-3.0, -1.0)
         """
-        return self._derivatives(wrt, [J]).of_readings()
+        return self._derivatives(wrt, [J])
 
     def sensitivity(self, wrt: Sequence[Any]) -> list[Array]:
         """Derivatives of all displacements of this static solution by few parameters: a list of
@@ -442,12 +441,12 @@ class State(Immutable, MaterialPoints, Output):
         wrt
             As for :meth:`gradient`.
         """
-        return self._derivatives(wrt).of_displacements()
+        return self._derivatives(wrt)
 
     def _derivatives(self, wrt, readings=()):
         refuse(self.system.derivatives is None, "this state does not know its scene, as after a "
                "pickle: solve it again, or use a skfem_ancf.Design")
-        return self.system.derivatives(self, wrt, readings)
+        return self.system.derivatives(self, wrt, readings).found()
 
     # recovered fields
 
@@ -675,7 +674,7 @@ class State(Immutable, MaterialPoints, Output):
         if frame is not None and beam is None:
             multipliers = self.multipliers[:len(frame.equations)]
             return Reaction(*frame.reaction(boundary, self._acted, multipliers))
-        member: Any = select_member(self.beams, system.members[len(self.beams):], beam)
+        member = self._member(beam)
         s = system.of(member)
         nodes = np.unique(member.dofs(boundary) // member.nd)
         there = np.zeros(system.N, dtype=bool)

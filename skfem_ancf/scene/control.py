@@ -345,20 +345,17 @@ class Held(Amplitude):
 
     def __init__(self, first: Any, ramped: bool) -> None:
         self.first, self.ramped = np.asarray(first, dtype=float), ramped
-        self.set(self.first, self.first, 0.0, 1.0)
-
-    def set(self, before: Array, value: Array, t: float, dt: float) -> None:
-        """Set the values at both ends of the step from t to t + dt."""
-        self._before, self._value, self._t, self._dt = before, value, t, dt
+        #: The values at both ends of a step, its start and its size.
+        self.step = self.first, self.first, 0.0, 1.0
 
     def sampled(self, times: Array) -> Array:
-        return np.full(len(times), self._value)
+        return np.full(len(times), self.step[1])
 
     def __call__(self, t: Any) -> Any:
+        before, value, start, dt = self.step
         if not self.ramped:
-            return float(self._value)
-        part = min(max((t - self._t) / self._dt, 0.0), 1.0)
-        return self._before + part * (self._value - self._before)
+            return float(value)
+        return before + min(max((t - start) / dt, 0.0), 1.0) * (value - before)
 
 
 class Stepper:
@@ -438,7 +435,7 @@ class Stepper:
     def _set(self, values):
         t = self._begun + self.dt * self._n
         for one, before, value in zip(self._held, self._values, values):
-            one.set(before, value, t, self.dt)
+            one.step = before, value, t, self.dt
 
     @property
     def t(self) -> float:

@@ -234,13 +234,12 @@ class Design:
         first, n = len(self._values), scene.system.N + scene.system.constraints.m
         # the readings, then the rows of eigenvalues and those of their checks
         owners = [one for k, frozen in enumerate(self._frozen) for one in (
-            self._places[k], first + k)[:1 if frozen.check is None else 2]]
+            self._places[k], first + k)[:2 if frozen.checked else 1]]
         self._owners = np.concatenate([np.arange(first), np.repeat(owners, n)]).astype(int)
         P = self._changes(p, state)
         out = np.zeros((first + len(self._frozen), len(p)))
         if state is not None:
-            # sensors and eigenvalues by the adjoint; functions by differences along the changes of
-            # the solution
+            # sensors and eigenvalues by the adjoint
             by_state, R, P = np.zeros((first, n)), P[:n], P[n:]
             at, functions, eigenvalues = 0, [], iter(self._frozen)
             for one, size in zip(self._sensors(scene), self._counts):
@@ -254,13 +253,24 @@ class Design:
                     functions.append((one.what if isinstance(one, Sensor) else one, at, size))
                 at += size
             out[:first] = -(adjoint_of(state, by_state, R) @ R)
-            z = changes_of(state, R).T if functions else ()
-            for function, at, size in functions:
-                out[at:at + size] = np.array([_along(function, state, x) for x in z]).T
+            # functions by differences along the changes of the solution
+            N, sizes = state.system.N, scene.system.constraints.coordinate_sizes
+            for k, z in enumerate(changes_of(state, R).T if functions else ()):
+                largest = np.abs(z[:N] / sizes).max()
+                small = TOUCHING if state.system.forces.contacts.obstacles else ASIDE
+                step = small / largest if largest > 0.0 else 1.0
+                for x, c in STENCIL:
+                    moved = State(state.system, state.u + x * step * z[:N], state.load,
+                                  memory=state.memory,
+                                  multipliers=state.multipliers + x * step * z[N:])
+                    for function, at, size in functions:
+                        out[at:at + size, k] += c / step * np.ravel(
+                            ask_array("a reading", None, function, moved))
         np.add.at(out, self._owners, P.toarray())
         for frozen, work in zip(self._frozen, out[first:]):
-            if frozen.check is not None:
-                frozen.check(work)
+            if frozen.checked and np.any(np.abs(work) > SYMMETRIC):
+                raise InputError(f"parameter {np.argmax(np.abs(work))} disturbs the symmetry of "
+                                 "the bifurcation: the critical load has no derivative")
         return out[:first]
 
     def _changes(self, p, state):
@@ -398,22 +408,20 @@ class Gradient(Design):
         super().__init__(self.build, readings)
         self._begin(self.build.start, scene, state)
 
-    def _shaped(self, found):
+    def found(self) -> list[Array]:
+        """For each of ``wrt`` an array (r, ...), of one number (...); without readings (N, ...),
+        the derivatives of the displacement."""
+        if self.readings:
+            found = self.jacobian(self.build.start)
+            found = found[0] if len(found) == 1 else found
+        else:
+            require_smooth(self.state)
+            self._frozen, self._owners = [], np.zeros(0, int)
+            P = self._changes(self._p, self.state)
+            adjoint_of(self.state, np.zeros((0, P.shape[0])), P)  # or why there is none
+            found = changes_of(self.state, P)[:self.state.system.N]
         return [found[..., one.at].reshape((*found.shape[:-1], *one.start.shape))
                 for one in self.build.each]
-
-    def of_readings(self) -> list[Array]:
-        """Of the readings, for each of ``wrt`` an array (r, ...); (...) of one number."""
-        found = self.jacobian(self.build.start)
-        return self._shaped(found[0] if len(found) == 1 else found)
-
-    def of_displacements(self) -> list[Array]:
-        """Of the displacement, for each of ``wrt`` an array (N, ...)."""
-        require_smooth(self.state)
-        self._frozen, self._owners = [], np.zeros(0, int)
-        P, N = self._changes(self._p, self.state), self.state.system.N
-        adjoint_of(self.state, np.zeros((0, P.shape[0])), P)  # or why there is none
-        return self._shaped(changes_of(self.state, P)[:N])
 
 
 def require_smooth(state: State) -> None:
@@ -451,22 +459,18 @@ def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
         raise InputError(f"this state snaps or branches: one shape has a stiffness of only "
                          f"{soft @ force / resists:.1g} of its material; read CriticalLoad()")
     if system.forces.contacts.groups:
-        _require_pressed(system, u, state.load, soft)
+        largest = np.abs(system.internal_force(u, None, state.load)
+                         * c.coordinate_sizes).max() / system.size
+        contacts = system.forces.contacts
+        for (_, group), (_, x, push, _, gap) in zip(
+                contacts.groups, contacts.pushes(u, None, state.load)):
+            i = group.first + 2 * np.arange(len(group.weights))[:, None]
+            # a point that supports hold can neither lift nor press
+            moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))
+            at = (np.abs(gap) < TOUCH * group.height) & (np.hypot(*push) <= TOUCH * largest) & (
+                moves > HELD * moves.max())
+            refuse_any(at, "a point just touches an obstacle, at {:.6g}: take another load", x)
     return found[:-1]
-
-
-def _require_pressed(system, u, load, soft):
-    """Raise InputError where a point just touches an obstacle, and a force (N,) could move it."""
-    contacts = system.forces.contacts
-    largest = np.abs(system.internal_force(u, None, load)
-                     * system.constraints.coordinate_sizes).max() / system.size
-    for (_, group), (_, x, push, _, gap) in zip(contacts.groups, contacts.pushes(u, None, load)):
-        i = group.first + 2 * np.arange(len(group.weights))[:, None]
-        # a point that supports hold can neither lift nor press
-        moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))
-        at = (np.abs(gap) < TOUCH * group.height) & (np.hypot(*push) <= TOUCH * largest) & (
-            moves > HELD * moves.max())
-        refuse_any(at, "a point just touches an obstacle, at {:.6g}: take another load", x)
 
 
 def tangent_of(state: State, P: Any) -> Bordered:
@@ -481,20 +485,6 @@ def changes_of(state: State, P: Any) -> Array:
     """The changes of displacements and multipliers by those of their equations, (N + m, n)."""
     N = state.system.N
     return np.concatenate(tangent_of(state, P).solve([1.0], -P[:N].toarray(), -P[N:].toarray()))
-
-
-def _along(function, state, z):
-    """The derivative of a function of the State along a change (N + m,) of the solution, (r,)."""
-    system, N = state.system, state.system.N
-    size = np.abs(z[:N] / system.constraints.coordinate_sizes).max()
-    step = (TOUCHING if system.forces.contacts.obstacles else ASIDE) / size if size > 0.0 else 1.0
-
-    def at(k):
-        return np.ravel(ask_array("a reading", None, function, State(
-            system, state.u + k * step * z[:N], state.load, memory=state.memory,
-            multipliers=state.multipliers + k * step * z[N:])))
-
-    return sum(c / step * at(k) for k, c in STENCIL)
 
 
 # eigenvalues as readings
@@ -512,12 +502,12 @@ def residual(system: Any, u: Array, multipliers: Array, load: float, memory: Any
 class Frozen(NamedTuple):
     """The derivatives of an eigenvalue: by parameters that of the sum of ``rows`` of a scene.
     ``by_state`` (N + m,) is that by the displacements and multipliers of the static solution, or
-    None. ``check`` is a function of the sum of the second half of the rows of each parameter,
-    (n,)."""
+    None. If ``checked``, the sum of the second half of the rows must vanish for each parameter: it
+    is the work on the mode of a bifurcation."""
 
     rows: Any
     by_state: Array | None = None
-    check: Any = None
+    checked: bool = False
 
 
 class EigenReading:
@@ -715,13 +705,7 @@ class CriticalLoad(EigenReading):
             return np.concatenate([factor * (one.rows(scene.system) - adjoint * rest),
                                    left * rest / size])
 
-        return Frozen(rows, check=_require_symmetry)
-
-
-def _require_symmetry(work):
-    if np.any(np.abs(work) > SYMMETRIC):
-        raise InputError(f"parameter {np.argmax(np.abs(work))} disturbs the symmetry of the "
-                         "bifurcation: the critical load has no derivative")
+        return Frozen(rows, checked=True)
 
 
 class _Quadratic:

@@ -289,11 +289,17 @@ class Frame(Scene):
             refuse(given["height"] is None, "the lines need a height: give height=, or in "
                    "sections, as {{{!r}: {{'height': 0.1}}}}", name)
             numbers = lines if "height" in sections.get(name, {}) else np.arange(m)
-            height = _heights(given.pop("height"), numbers)
-            lines = np.intersect1d(lines, graph.distinct)
-            groups[name] = lines
-            if isinstance(height, list):
-                height = [height[k] for k in np.searchsorted(numbers, lines)]
+            height = given.pop("height")
+            groups[name] = lines = np.intersect1d(lines, graph.distinct)
+            if isinstance(height, (list, tuple)) or not callable(height) and np.ndim(height) == 1:
+                refuse(len(height) != len(numbers), "height has {} entries for {} line(s): give "
+                       "one for each, or a number or a function of s from 0 to 1 for all",
+                       len(height), len(numbers))
+                found = [one if callable(one) else require_positive(f"height of line {k}", one)
+                         for k, one in zip(numbers, height)]
+                height = [found[k] for k in np.searchsorted(numbers, lines)]
+            elif not callable(height):
+                height = require_finite_scalar("height", height)
             mesh = graph.mesh(lines, elements, height)
             beams.append(Beam(mesh, name=name, **given))
         graph.curves = {}  # the meshes have them
@@ -493,18 +499,6 @@ class Frame(Scene):
 def _no_beam(beam):
     refuse(beam is not None, "a frame is supported and loaded at nodes, got beam={!r}: give a "
            "name, a number, or a point (x, y)", beam)
-
-
-def _heights(height, lines):
-    """A number or a function, or a list with one for each line."""
-    if callable(height):
-        return height
-    if not isinstance(height, (list, tuple)) and np.ndim(height) != 1:
-        return require_finite_scalar("height", height)
-    refuse(len(height) != len(lines), "height has {} entries for {} line(s): give one for each, or "
-           "a number or a function of s from 0 to 1 for all", len(height), len(lines))
-    return [one if callable(one) else require_positive(f"height of line {k}", one)
-            for k, one in zip(lines, height)]
 
 
 def _hinged(graph, hinges):

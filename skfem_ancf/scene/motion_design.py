@@ -141,25 +141,20 @@ class MotionDesign(Design):
         self._values = np.concatenate([np.reshape(seen[name], (len(seen.t), -1))
                                        for name in self.readings], axis=1).ravel()
 
-    def _segment(self, j: int) -> list[Motion]:
-        """The instants from a kept state to the next, computed again."""
-        first, last = (self.history.state(k)._motion for k in (j, j + 1))
-        n = round((last.t - first.t) / self.dt)
-        if n <= 1:
-            return [first, last]
-        between = integrator_of(self._built.system, self.scheme).run(first, self.dt, n - 1)
-        refuse(len(between) < n - 1, "the steps after t = {:.6g} do not converge a second time: "
-               "give a smaller dt, or every=1", first.t)
-        return [first, *between, last]
-
     def _steps(self, back: bool = False) -> Iterator[tuple[Motion | None, Motion]]:
         """Pairs of instants from the start, which is (None, first), or back from the end."""
         start, order = (None, self.history.state(0)._motion), -1 if back else 1
         if not back:
             yield start
         for j in range(len(self.history) - 1)[::order]:
-            found = self._segment(j)
-            yield from list(pairwise(found))[::order]
+            first, last = (self.history.state(k)._motion for k in (j, j + 1))
+            n, between = round((last.t - first.t) / self.dt), list[Motion]()
+            if n > 1:  # those between kept states are computed again
+                between = [*integrator_of(self._built.system, self.scheme).run(
+                    first, self.dt, n - 1)]
+                refuse(len(between) < n - 1, "the steps after t = {:.6g} do not converge a second "
+                       "time: give a smaller dt, or every=1", first.t)
+            yield from list(pairwise([first, *between, last]))[::order]
         if back:
             yield start
 
@@ -397,15 +392,42 @@ class _MeanStep(_Step):
         system = self._system = design._built.system
         c, h, self.y, self._begin, self._design = (
             system.constraints, y.t - before.t, y, before, design)
-        self._h, self._ahead = h, h / (h + before.before)
-        self._middle, self._t = 0.5 * (before.u + y.u), 0.5 * (before.t + y.t)
-        self._speed, self._turn = (y.u - before.u) / h, 0.25 * (before.v + y.v)
+        self._h, more = h, 1.0 + h / (h + before.before)
+        self._middle = u = 0.5 * (before.u + y.u)
+        self._t = t = 0.5 * (before.t + y.t)
+        self._speed, turn = (y.u - before.u) / h, 0.25 * (before.v + y.v)
         self._velocity = np.where(c.free, 2.0 * self._speed - before.v, y.v)  # before joints act
         self._J = J = c.sparse_jacobian(self._middle, self._t)
         self._impulse = lsqr(J[:, c.free].T, system.mass.multiply(self._velocity - y.v)[c.free],
                              atol=0.0, btol=0.0)[0] if c.m else np.zeros(0)
         self._force = y.force - self._impulse / h
-        self._solver = self._linearised()
+        M, force = sparse.csr_array(system.mass.tocsc()), partial(_mean, system, t)
+        late = _by_columns(design, lambda x: force(before.u, x), y.u, t, True)
+        early = _by_columns(design, lambda x: force(x, y.u), before.u, t, True)
+        if system.damped:
+            held = replace(y, t=t, u=u, v=self._speed)
+            D = matrices_of(system, state_of(system, design.scheme, held)).D / h
+            turning = 0.5 * _turning(design, held)
+            late, early = late + turning + D, early + turning - D
+        s, kick = INSTANT * h, c.curvature(u, t, self._impulse)
+        # derivatives along the mean velocity: of J, and of the curvature if Phi is not quadratic
+        by_impulse = slope_at_zero(lambda x: c.sparse_jacobian(u + x * turn, t), s)
+        third = slope_at_zero(lambda x: c.curvature(u + x * turn, t, self._impulse), s)
+        turned = 0.5 * (c.curvature(u, t, self._force) + third)
+        A = late + turned + 2.0 / h**2 * M
+        self._before = (self._map({
+            (0, 0): early + turned - 2.0 / h**2 * M, (0, 1): 0.25 * kick - 2.0 / h * M,
+            (2, 0): 0.5 * kick + 2.0 / h * M, (2, 1): M}, "umum", START),)
+        self._after = self._map({
+            (0, 0): 1.0, (1, 2): 1.0, (2, 2): more / h, (3, 2): 1.0 / h, (4, 1): 1.0,
+            (4, 3): 1.0 / h, (5, 1): more, (5, 3): more / h}, END, "umum")
+        self._kept = self._map({(2, 1): -more / h, (2, 3): 1.0 - more, (3, 1): -1.0 / h,
+                                (5, 4): 1.0 - more}, END, START)
+        J = c.sparse_jacobian(y.u, y.t)
+        slope = slope_at_zero(lambda x: c.sparse_jacobian(y.u + x * y.v, y.t + x), s)
+        self._solver = _factors([
+            [A, self._J.T, 0.25 * kick, by_impulse.T], [J, None, None, None],
+            [0.5 * kick - 2.0 / h * M, None, M, self._J.T], [slope, None, J, None]], A, c, h)
 
     def equations(self, scene: Any) -> Array:
         """The equations of a scene with other parameters at this step, (2 (N + m),)."""
@@ -421,37 +443,6 @@ class _MeanStep(_Step):
         return np.concatenate([
             first, c.constraint(y.u, y.t), M(y.v - self._velocity) + J.T @ self._impulse,
             _rate(INSTANT * self._h, system, y.u, y.v, y.t)])
-
-    def _linearised(self):
-        system, y, start, h, c, t = (self._system, self.y, self._begin, self._h,
-                                     self._system.constraints, self._t)
-        M, u, force = sparse.csr_array(system.mass.tocsc()), self._middle, partial(_mean, system, t)
-        late = _by_columns(self._design, lambda x: force(start.u, x), y.u, t, True)
-        early = _by_columns(self._design, lambda x: force(x, y.u), start.u, t, True)
-        if system.damped:
-            held = replace(y, t=t, u=u, v=self._speed)
-            D = matrices_of(system, state_of(system, self._design.scheme, held)).D / h
-            turning = 0.5 * _turning(self._design, held)
-            late, early = late + turning + D, early + turning - D
-        s, kick = INSTANT * h, c.curvature(u, t, self._impulse)
-        # derivatives along the mean velocity: of J, and of the curvature if Phi is not quadratic
-        by_impulse = slope_at_zero(lambda x: c.sparse_jacobian(u + x * self._turn, t), s)
-        third = slope_at_zero(lambda x: c.curvature(u + x * self._turn, t, self._impulse), s)
-        turned = 0.5 * (c.curvature(u, t, self._force) + third)
-        A = late + turned + 2.0 / h**2 * M
-        self._before, more = (self._map({
-            (0, 0): early + turned - 2.0 / h**2 * M, (0, 1): 0.25 * kick - 2.0 / h * M,
-            (2, 0): 0.5 * kick + 2.0 / h * M, (2, 1): M}, "umum", START),), 1.0 + self._ahead
-        self._after = self._map({
-            (0, 0): 1.0, (1, 2): 1.0, (2, 2): more / h, (3, 2): 1.0 / h, (4, 1): 1.0,
-            (4, 3): 1.0 / h, (5, 1): more, (5, 3): more / h}, END, "umum")
-        self._kept = self._map({(2, 1): -more / h, (2, 3): 1.0 - more, (3, 1): -1.0 / h,
-                                (5, 4): 1.0 - more}, END, START)
-        J = c.sparse_jacobian(y.u, y.t)
-        slope = slope_at_zero(lambda x: c.sparse_jacobian(y.u + x * y.v, y.t + x), s)
-        return _factors([
-            [A, self._J.T, 0.25 * kick, by_impulse.T], [J, None, None, None],
-            [0.5 * kick - 2.0 / h * M, None, M, self._J.T], [slope, None, J, None]], A, c, h)
 
 
 def _factors(rows, K, c, h):

@@ -23,8 +23,7 @@ from ..dynamics.schemes import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate, resume
 from ..dynamics.sensors import Sensor, locate
-from ..equations.matrices import (SceneMatrices, linear_external_force, linear_force,
-                                  matrices_of)
+from ..equations.matrices import SceneMatrices, linear_external_force, linear_force, matrices_of
 from ..equations.system import System
 from ..results.checks import warn_of, warn_of_meetings, warn_of_points
 from ..results.modes import Buckling, FrequencyResponse, Modes

@@ -288,14 +288,37 @@ class _Rounds:
         raised = [None if error <= 0.1 * self.tol and k in self._before else self.raised(k)
                   for k, error in enumerate(errors)]
         self._before = {k: e for k, e in enumerate(errors) if self.raised(k) is not None}
-        scene, self.state = fine, better
-        if any(e is None for e in raised):
-            marked = _mark(self.scene, state, fine, better, split)
-            scene, self.state = self.scene, state
-            if any(e is not None for e in raised) or any(len(m) for m in marked):
-                scene, self.state = _changed(self.scene, marked, raised), None
-        self._refinements = self.done(errors, scene)
-        self.scene = scene
+        if all(e is not None for e in raised):
+            self._refinements, self.scene, self.state = self.done(errors, fine), fine, better
+            return
+        # elements with most of the difference in the energy norm, of beams whose elements the fine
+        # mesh has halved; where the loads of both meshes differ, as those that jump within an
+        # element, the work of their difference is included
+        before = self.scene.system.external_force(state.u)
+        after, shares = fine.system.external_force(better.u), []
+        for a, b, s in zip(beams, fine.beams, split):
+            if not s:
+                shares.append(np.zeros(a.mesh.nelements))
+                continue
+            v, t, nb, halving = better.u_of(b), a.mesh.t, a.element.nodal_dofs, _halving(a)
+            d = v - _prolonged(a, halving, state.u_of(a))
+            # the force on the finer mesh, restricted to the coarse one by the transpose
+            new = np.insert(np.zeros(a.mesh.p.shape[1], dtype=bool), t[1], True)
+            force = after[fine.system.of(b)].reshape(-1, nb, 2)
+            gap, ends = force[~new], np.einsum("eij,eic->ejc", halving, force[new])
+            np.add.at(gap, t[0], ends[:, :nb])
+            np.add.at(gap, t[1], ends[:, nb:])
+            gap -= before[self.scene.system.of(a)].reshape(gap.shape)
+            work = np.abs(np.sum(gap * d.reshape(force.shape)[~new], axis=(1, 2)))
+            d = b.kernel.gather(d).reshape(b.mesh.nelements, -1)
+            local = np.abs(np.einsum("ei,eij,ej->e", d, b.kernel.tangents(v), d))
+            shares.append(local.reshape(-1, 2).sum(axis=1) + 0.5 * work[t].sum(axis=0))
+        chosen = _largest(np.concatenate(shares), [len(e) for e in shares])
+        marked = [c if s else np.arange(0) for c, s in zip(chosen, split)]
+        scene, self.state = self.scene, state
+        if any(e is not None for e in raised) or any(len(m) for m in marked):
+            scene, self.state = _changed(self.scene, marked, raised), None
+        self._refinements, self.scene = self.done(errors, scene), scene
 
 
 def _changed(scene, marked=None, elements=None):
@@ -401,34 +424,6 @@ def _prolonged(beam, halving, u):
     u, t = u.reshape(-1, beam.element.nodal_dofs, 2), beam.mesh.t
     middle = np.einsum("eij,ejc->eic", halving, np.concatenate([u[t[0]], u[t[1]]], axis=1))
     return np.insert(u, t[1], middle, axis=0).ravel()
-
-
-def _mark(coarse, state, fine, better, split):
-    """Elements of the coarse mesh with most of the difference in the energy norm."""
-    # Only beams that are ``split``, whose elements the fine mesh has halved, have any. Where the
-    # loads of both meshes differ, as those that jump within an element, the work of their
-    # difference is included.
-    before, after = coarse.system.external_force(state.u), fine.system.external_force(better.u)
-    errors = []
-    for a, b, s in zip(coarse.beams, fine.beams, split):
-        if not s:
-            errors.append(np.zeros(a.mesh.nelements))
-            continue
-        v, t, nb, halving = better.u_of(b), a.mesh.t, a.element.nodal_dofs, _halving(a)
-        d = v - _prolonged(a, halving, state.u_of(a))
-        # the force on the finer mesh, restricted to the coarse one by the transpose
-        new = np.insert(np.zeros(a.mesh.p.shape[1], dtype=bool), t[1], True)
-        force = after[fine.system.of(b)].reshape(-1, nb, 2)
-        gap, shares = force[~new], np.einsum("eij,eic->ejc", halving, force[new])
-        np.add.at(gap, t[0], shares[:, :nb])
-        np.add.at(gap, t[1], shares[:, nb:])
-        gap -= before[coarse.system.of(a)].reshape(gap.shape)
-        work = np.abs(np.sum(gap * d.reshape(force.shape)[~new], axis=(1, 2)))
-        d = b.kernel.gather(d).reshape(b.mesh.nelements, -1)
-        local = np.abs(np.einsum("ei,eij,ej->e", d, b.kernel.tangents(v), d))
-        errors.append(local.reshape(-1, 2).sum(axis=1) + 0.5 * work[t].sum(axis=0))
-    chosen = _largest(np.concatenate(errors), [len(e) for e in errors])
-    return [c if s else np.arange(0) for c, s in zip(chosen, split)]
 
 
 def _largest(errors, numbers):

@@ -154,14 +154,12 @@ def _on_structure(axes, state, beams, recover):
         scale = ordinate / largest if largest > noise[name] else 0.0
         for line in lines:
             ax.plot(*line["x"], color=INK, lw=1.6, zorder=3, solid_capstyle="round")
-            if scale:
-                _fill(ax, line, line[name], -scale if name == "M" else scale)
         for grid in others:  # rigid bodies and domains
             ax.add_collection(PolyCollection(grid.x.T[grid.cells], color=GHOST, zorder=1))
         Sketch(ax, np.zeros_like(state.u), points).draw(supports)
         if scale:
-            _label(ax, lines, name, -scale if name == "M" else scale, LABELLED * largest, size,
-                   unit_in(units, KINDS[name]))
+            _draw(ax, lines, name, -scale if name == "M" else scale, LABELLED * largest, size,
+                  unit_in(units, KINDS[name]))
         (x0, y0), (x1, y1) = low - ROOM * size, high + ROOM * size
         ax.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1), yticks=[])
         dress(ax, label + " = 0" * (not scale), with_unit("x", units[1] if units else ""), "")
@@ -169,36 +167,30 @@ def _on_structure(axes, state, beams, recover):
     axes[-1].figure.text(0.99, 0.0, NOTE, va="top", ha="right", fontsize=7, color=MUTED, gid="note")
 
 
-def _fill(ax, line, values, scale):
-    """Fill between a member and its diagram, by the sign of the values."""
-    start, normal = line["x"], line["normal"]
-    for colour, part in zip(SIGNS, (np.maximum(values, 0.0), np.minimum(values, 0.0))):
-        edge = start + scale * part * normal
-        ax.fill(*np.hstack([start, edge[:, ::-1]]), color=colour, alpha=0.25, lw=0, zorder=1.5,
-                gid="diagram")
-    edge = start + scale * values * normal
-    closed = np.hstack([start[:, :1], edge, start[:, -1:]])
-    ax.plot(*closed, color=MUTED, lw=0.9, zorder=2)
-
-
-def _label(ax, lines, name, scale, least, size, unit):
-    """Write extremes of each line, the largest first, where there is room."""
+def _draw(ax, lines, name, scale, least, size, unit):
+    """Fill between members and their diagrams, by the sign of the values, and write extremes of
+    each line, the largest first, where there is room."""
     # One at an end of a member is moved along it, away from what meets there.
     from matplotlib.patheffects import withStroke
 
     places = []
     for line in lines:
-        values = line[name]
+        values, start, normal = line[name], line["x"], line["normal"]
+        for colour, part in zip(SIGNS, (np.maximum(values, 0.0), np.minimum(values, 0.0))):
+            edge = start + scale * part * normal
+            ax.fill(*np.hstack([start, edge[:, ::-1]]), color=colour, alpha=0.25, lw=0, zorder=1.5,
+                    gid="diagram")
+        edge = start + scale * values * normal
+        ax.plot(*np.hstack([start[:, :1], edge, start[:, -1:]]), color=MUTED, lw=0.9, zorder=2)
         found = {int(np.argmax(values)), int(np.argmin(values))}
         if np.ptp(values) < 0.01 * np.max(np.abs(values)):
             found = {len(values) // 2}  # constant
         for k in found:
             if abs(values[k]) > least:
-                side = np.sign(scale * values[k]) * line["normal"][:, k]
-                tip = line["x"][:, k] + scale * values[k] * line["normal"][:, k]
-                inward = line["x"][:, len(values) // 2] - line["x"][:, k]
+                side = np.sign(scale * values[k]) * normal[:, k]
+                inward = start[:, len(values) // 2] - start[:, k]
                 inward *= (k in (0, len(values) - 1)) / (np.hypot(*inward) or 1.0)
-                places.append((abs(values[k]), values[k], tip, side, inward))
+                places.append((abs(values[k]), values[k], edge[:, k], side, inward))
     taken: list[tuple[Array, Array]] = []
     for _, value, tip, side, inward in sorted(places, key=lambda one: -one[0]):
         towards = [a if abs(a) > 0.4 else c if abs(c) > 0.4 else 0.0 for a, c in zip(side, inward)]

@@ -26,9 +26,6 @@ CONTACT = 0.08
 #: Height over width below which the colour bar is below a picture.
 FLAT = 0.35
 
-_EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max",
-           (True, True): "both"}
-
 
 def plot_state(state: Any, field: Any = None, ax: Any = None, *,
                thickness: float | str = "auto", undeformed: bool = True, colorbar: bool = True,
@@ -121,14 +118,16 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
             artist.set_alpha(None if k == len(parts) else FADED + (1.0 - FADED) * k / len(parts))
         scenery.undeformed = False
     if symbols:
-        sketch(ax, scenery, states[-1]).draw(symbols)
+        Sketch(ax, scenery.scale * states[-1].u, scenery.points(-1)[:, :2],
+               units_of(states[-1])).draw(symbols)
     if contact:
         _draw_contact(ax, scenery, states[-1])
     frame(ax, scenery, bool(symbols))
     dress(ax, (drawn.title or drawn.name) if title is None else title, *scenery.axes, scenery.note)
     if colorbar and image is not None:
-        ends = bool(np.any(values < scenery.low)), bool(np.any(values > scenery.high))
-        colour_bar(ax, image, _EXTEND[ends], scenery.label(drawn.symbol, unit))
+        beyond = np.any(values < scenery.low) + 2 * np.any(values > scenery.high)
+        colour_bar(ax, image, ("neither", "min", "max", "both")[beyond],
+                   scenery.label(drawn.symbol, unit))
     save(ax)
     return ax
 
@@ -183,65 +182,47 @@ def plot_scene(scene: Any, ax: Any = None, *, loads: bool = True, supports: bool
         As for :func:`plot_state`.
     """
     save = page(ax, title, filename, dpi, bbox_inches="tight")
+    from matplotlib.collections import PolyCollection
+    from matplotlib.patches import Patch
+
     _require_flags(loads=loads, supports=supports, nodes=nodes, names=names)
     state = scene.state(load=0.0) if hasattr(scene, "state") else scene
     scenery = Scenery([state], "displacement", thickness, True, None, (8, 2), False)
     scenery.margin, inside = WIDE, ax is not None
+    texts = {}  # of the legend, which says what materials differ in
+    for one in dict.fromkeys(layer.material for b in state.beams for layer in b.across.layers):
+        E = "E(x, y)" if callable(one.E) else f"E = {one.E:g}"
+        texts[one] = f"{type(one).__name__}\n{E}, ν = {one.nu:g}"
+    laws = list(dict.fromkeys(texts.values()))
+    colours = dict(zip(laws, BODIES)) if 1 < len(laws) <= len(BODIES) else {}
     if ax is None:
-        ax = new_axes(_figsize(scenery.every[:, :2], bool(_laws(state.beams))))
+        ax = new_axes(_figsize(scenery.every[:, :2], bool(colours)))
     paint(ax, scenery, [0], None, BODIES[0])
-    _materials(ax, scenery, state.beams, (8, 2), inside)
-    drawn = sketch(ax, scenery, state)
+    for body, beam in zip(scenery.frames[0], state.beams if colours else ()):
+        X, cells = layout(beam, 8, 2)
+        which = np.broadcast_to(beam.across.which(np.mean(X[..., cells], axis=-1)), (
+            beam.mesh.nelements, len(cells))).ravel()  # the layer of each quad
+        corners = body.reference.reshape(2, -1).T[body.cells]
+        for k, layer in enumerate(beam.across.layers):
+            colour = colours[texts[layer.material]]
+            ax.add_collection(PolyCollection(corners[which == k], facecolor=colour, linewidth=0.3,
+                                             edgecolor=colour, zorder=1.2, gid="layer"))
+    if colours:
+        ax.legend(handles=[Patch(facecolor=colour, edgecolor=INK, linewidth=0.5, label=text)
+                           for text, colour in colours.items()],
+                  fontsize=8, frameon=False, **({} if inside else {
+                      "loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}))
+    drawn = Sketch(ax, state.u, scenery.points(0)[:, :2], units_of(state))
     drawn.draw(symbols_of(state, loads, supports, True))
     if nodes:
         at = np.hstack([np.zeros((2, 0)), *(beam.mesh.p for beam in state.beams)])
         ax.plot(*at, ".", color=INK, ms=4, zorder=3, gid="node")
     if names:
-        drawn.names(scenery.names)
+        drawn.names(scenery.grids[0])
     frame(ax, scenery, True)
     dress(ax, title, *scenery.axes, scenery.note)
     save(ax)
     return ax
-
-
-def _laws(beams):
-    """The legend text of each material and its colour; none for one material or too many."""
-    every = dict.fromkeys(layer.material for beam in beams for layer in beam.across.layers)
-    texts = dict.fromkeys(map(_law, every))
-    return dict(zip(texts, BODIES)) if 1 < len(texts) <= len(BODIES) else {}
-
-
-def _law(material):
-    E = "E(x, y)" if callable(material.E) else f"E = {material.E:g}"
-    return f"{type(material).__name__}\n{E}, ν = {material.nu:g}"
-
-
-def _materials(ax, scenery, beams, subdivide, inside):
-    """Fill layers by their materials, where there are several, and say which is which."""
-    from matplotlib.collections import PolyCollection
-    from matplotlib.patches import Patch
-
-    colours = _laws(beams)
-    if not colours:
-        return
-    for body, beam in zip(scenery.frames[0], beams):
-        X, cells = layout(beam, *subdivide)
-        which = np.broadcast_to(beam.across.which(np.mean(X[..., cells], axis=-1)), (
-            beam.mesh.nelements, len(cells))).ravel()  # the layer of each quad
-        corners = body.points(body.reference, scenery.factor).reshape(2, -1).T[body.cells]
-        for k, layer in enumerate(beam.across.layers):
-            colour = colours[_law(layer.material)]
-            ax.add_collection(PolyCollection(corners[which == k], facecolor=colour, linewidth=0.3,
-                                             edgecolor=colour, zorder=1.2, gid="layer"))
-    ax.legend(handles=[Patch(facecolor=colour, edgecolor=INK, linewidth=0.5, label=text)
-                       for text, colour in colours.items()],
-              fontsize=8, frameon=False, **({} if inside else {
-                  "loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}))
-
-
-def sketch(ax: Any, scenery: Scenery, state: Any) -> Sketch:
-    """A Sketch of symbols at the drawn state, the last of a scenery."""
-    return Sketch(ax, scenery.scale * state.u, scenery.points(-1)[:, :2], units_of(state))
 
 
 def frame(ax: Any, scenery: Scenery, wide: bool) -> None:
@@ -506,7 +487,14 @@ def animate(history: Any, filename: StrPath, field: Any = None, *,
     images = _frames(scenery, t, size, cmap, unit)
     with output_file(path) as temporary:
         if film:
-            _mp4(temporary, images, fps)
+            import imageio.v2
+
+            with imageio.v2.get_writer(temporary, format="FFMPEG", mode="I", fps=fps,
+                                       macro_block_size=2) as writer:
+                for image in images:
+                    height, width, _ = image.shape  # players want even numbers of pixels
+                    writer.append_data(np.pad(
+                        image, ((0, height % 2), (0, width % 2), (0, 0)), "edge"))
         else:
             _gif(temporary, images, fps, scenery.colours(cmap))
     return path
@@ -564,13 +552,3 @@ def _gif(path, images, fps, cmap):
               for image in images]
     frames[0].save(path, format="GIF", save_all=True, append_images=frames[1:], loop=0,
                    duration=round(1000 / fps))
-
-
-def _mp4(path, images, fps):
-    import imageio.v2
-
-    with imageio.v2.get_writer(path, format="FFMPEG", mode="I", fps=fps,
-                               macro_block_size=2) as writer:
-        for image in images:
-            height, width, _ = image.shape  # players want even numbers of pixels
-            writer.append_data(np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), "edge"))

@@ -39,28 +39,53 @@ INK, MUTED, GHOST, RIGID, WALL = "#222222", "#666666", "#d9d9d9", "#bbbbbb", "#7
 BODIES = "#cfdbe6", "#e8d3a8", "#bcd9b4", "#e3bfc3", "#c9bfe0", "#b5dcd8", "#dcc7b2", "#d5d59e"
 
 
-class _Body:
-    """One beam: reference and deformed positions of grid points and axis, and the field."""
+class _Solid:
+    """A domain: drawn positions of its points, the field there, and quads; triangles repeat a
+    corner."""
 
-    def __init__(self, grid, state, beam, m, field, scale):
-        self.cells, self.height = grid.cells, beam.mesh.height
+    def __init__(self, grid, field):
+        if grid.values is None:
+            raise no_value(field)
+        values = field.of(grid.values)
+        self.values = values if field.components == 1 else np.sqrt(np.sum(values**2, axis=0))
+        self.cells = grid.cells[:, [0, 1, 2, -1]]
+        self.reference, self.deformed = grid.x, grid.x + grid.u
+
+    def outline(self, undeformed):
+        """Edges of the boundary, or of all cells of the reference configuration, (points, 2)."""
+        if undeformed:
+            return list(self.reference.T[self.cells])
+        size = 1e-6 * np.max(np.ptp(self.reference, axis=1))
+        number = np.unique(np.round(self.reference / size), axis=1, return_inverse=True)[1].ravel()
+        ends = np.concatenate([self.cells[:, [k, (k + 1) % 4]] for k in range(4)])
+        ends = ends[number[ends[:, 0]] != number[ends[:, 1]]]
+        _, first, times = np.unique(np.sort(number[ends], axis=1), axis=0, return_index=True,
+                                    return_counts=True)
+        return list(self.deformed.T[ends[first[times == 1]]])
+
+
+class _Body(_Solid):
+    """A beam, with positions (2, nelements, m + 1, rows) once its section is magnified."""
+
+    def __init__(self, grid, field, state, beam, m, scale):
+        super().__init__(grid, field)
+        self.height = beam.mesh.height
         # the axis is at eta = 1/2, which is on the grid only if it has an odd number of rows
         axis = values_on_grid(state, beam, np.array([np.linspace(0, 1, m + 1),
                                                      np.full(m + 1, 0.5)]), False)
         flat = (2, beam.mesh.nelements, m + 1)
         x, u = (y.reshape(*flat, grid.rows) for y in (grid.x, grid.u))
         axis_x, axis_u = (y.reshape(flat) for y in (axis.x, scale * axis.u))
-        self.reference, self.deformed = (x, axis_x), (x + u, axis_x + axis_u)
-        self.values = _values(field, grid)
+        #: Points and axis of both configurations.
+        self.shapes = (x, axis_x), (x + u, axis_x + axis_u)
 
-    def points(self, body, factor):
-        """Positions (2, nelements, m + 1, rows) with the section magnified by ``factor``."""
-        x, axis = body
-        return axis[..., None] + factor * (x - axis[..., None])
+    def magnify(self, factor):
+        self.reference, self.deformed = (
+            axis[..., None] + factor * (x - axis[..., None]) for x, axis in self.shapes)
 
-    def outline(self, body, factor):
+    def outline(self, undeformed):
         """Closed lines around each chain of elements, shape (points, 2)."""
-        x = self.points(body, factor)
+        x = self.reference if undeformed else self.deformed
         cuts = np.nonzero(np.hypot(*(x[:, 1:, 0] - x[:, :-1, -1])).max(axis=-1)
                           > 1e-6 * self.height)[0] + 1
         out = []
@@ -71,44 +96,12 @@ class _Body:
         return out
 
 
-class _Solid:
-    """One domain as a :class:`_Body`: quads; triangles repeat a corner."""
-
-    def __init__(self, grid, field):
-        self.cells = grid.cells[:, [0, 1, 2, -1]]
-        self.reference, self.deformed = grid.x, grid.x + grid.u
-        self.values = _values(field, grid)
-
-    def points(self, body, factor):
-        """Positions (2, n)."""
-        return body
-
-    def outline(self, body, factor):
-        """Edges of the boundary, or of all cells of the reference configuration, (points, 2)."""
-        if body is self.reference:
-            return list(body.T[self.cells])
-        size = 1e-6 * np.max(np.ptp(self.reference, axis=1))
-        number = np.unique(np.round(self.reference / size), axis=1, return_inverse=True)[1].ravel()
-        ends = np.concatenate([self.cells[:, [k, (k + 1) % 4]] for k in range(4)])
-        ends = ends[number[ends[:, 0]] != number[ends[:, 1]]]
-        _, first, times = np.unique(np.sort(number[ends], axis=1), axis=0, return_index=True,
-                                    return_counts=True)
-        return list(body.T[ends[first[times == 1]]])
-
-
-def _values(field, grid):
-    if grid.values is None:
-        raise no_value(field)
-    values = field.of(grid.values)
-    return values if field.components == 1 else np.sqrt(np.sum(values**2, axis=0))
-
-
 def _thickness(thickness, bodies):
     if not (isinstance(thickness, str) and thickness == "auto"):
         return require_positive("thickness", thickness)
     if not bodies:
         return 1.0
-    shapes = [shape for b in bodies for shape in (b.reference, b.deformed)]
+    shapes = [shape for b in bodies for shape in b.shapes]
     every = np.concatenate([axis.reshape(2, -1) for _, axis in shapes], axis=1)
     factor = round(READABLE * np.max(np.ptp(every, axis=1)) / max(b.height for b in bodies))
     for x, axis in shapes:  # both faces keep a third of the advance of the axis
@@ -120,37 +113,11 @@ def _thickness(thickness, bodies):
     return float(max(1, factor))
 
 
-def _scale(scale, found):
-    """Magnification of displacements; 1, 2 or 5 times a power of ten for "auto"."""
-    if not (isinstance(scale, str) and scale == "auto"):
-        return require_positive("scale", scale)
-    size = np.max(np.ptp(np.concatenate([grid.x for grid in found], axis=1), axis=1))
-    largest = max(float(np.max(np.hypot(*grid.u))) for grid in found)
-    if not 1e-12 * size < largest < VISIBLE * size:
-        return 1.0
-    wanted = VISIBLE * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(k for k in (1, 2, 5) if k * power <= wanted * (1 + 1e-9)))
-
-
-def _limits(limits, values, field):
-    require_unmasked("limits", limits)
-    if limits is not None:
-        with retold((TypeError, ValueError), "limits must be two numbers, got {!r}", limits):
-            low, high = limits
-        low, high = require_finite_scalar("limits", low), require_finite_scalar("limits", high)
-        refuse(not low < high, "limits must increase, got {!r}", limits)
-        return low, high
-    start = field.neutral
-    size = np.max(np.abs(values[np.isfinite(values)] - start), initial=0.0) or 1.0
-    return (start - size if field.signed else start), start + size
-
-
 class Scenery:
     """States of the same beams with one thickness factor and one range of colours. Arguments are
     those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and ``rigid`` are for
     each state its beams and domains, and the grids of its rigid bodies and of domains without the
-    field; ``found`` (n,) the values of all coloured points."""
+    field; ``found`` (n,) the values of all coloured points; ``grids`` are all members."""
 
     #: How far around the bodies obstacles are drawn.
     margin = AROUND
@@ -166,10 +133,20 @@ class Scenery:
         self.frames: list[list[Any]] = []
         self.rigid: list[list[Grid]] = []
         every = [grids(state, subdivide, recover=recover) for state in states]
-        self.scale = _scale(scale, [grid for found in every for grid in found])
+        if isinstance(scale, str) and scale == "auto":  # 1, 2 or 5 times a power of ten
+            both = [grid for found in every for grid in found]
+            size = np.max(np.ptp(np.concatenate([grid.x for grid in both], axis=1), axis=1))
+            largest = max(float(np.max(np.hypot(*grid.u))) for grid in both)
+            scale = 1.0
+            if 1e-12 * size < largest < VISIBLE * size:
+                wanted = VISIBLE * size / largest
+                power = 10.0 ** np.floor(np.log10(wanted))
+                scale = float(power * max(k for k in (1, 2, 5)
+                                          if k * power <= wanted * (1 + 1e-9)))
+        self.scale = require_positive("scale", scale)
         for state, found in zip(states, every):
             found = [grid._replace(u=self.scale * grid.u) for grid in found]
-            self.frames.append([_Body(grid, state, beam, subdivide[0], self.field, self.scale)
+            self.frames.append([_Body(grid, self.field, state, beam, subdivide[0], self.scale)
                                 for grid, beam in zip(found, state.beams)])
             self.rigid.append([])
             for grid in found[len(state.beams):]:
@@ -177,26 +154,27 @@ class Scenery:
                     self.frames[-1].append(_Solid(grid, self.field))
                 except AncfError:  # a rigid body, or the field is not defined there
                     self.rigid[-1].append(grid)
-        self.beams = [body for frame in self.frames for body in frame]
+        bodies = [body for frame in self.frames for body in frame]
         if isinstance(thickness, str) and thickness == "auto" and any(map(may_touch, states)):
             thickness = 1.0  # thicker sections would enter each other
-        self.factor = _thickness(thickness, [b for b in self.beams if isinstance(b, _Body)])
-        self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
+        beams = [body for body in bodies if isinstance(body, _Body)]
+        self.factor = _thickness(thickness, beams)
+        for beam in beams:
+            beam.magnify(self.factor)
+        self.found = np.concatenate([np.zeros(0), *(body.values for body in bodies)])
         if self.found.size and not np.any(np.isfinite(self.found)):
             raise no_value(self.field)
-        self.low, self.high = _limits(limits, self.found, self.field)
-        self._states, self._grids = states, every
-
-    @property
-    def names(self) -> list[tuple[str, Array]]:
-        """Names and positions (2,) of the members of the first frame; beams on the axis."""
-        def place(grid):
-            if grid.rows == 1:
-                return grid.x
-            columns = grid.x.reshape(2, grid.elements[-1] + 1, -1, grid.rows)
-            return columns[:, columns.shape[1] // 4, columns.shape[2] // 2]
-
-        return [(grid.name, np.mean(place(grid), axis=1)) for grid in self._grids[0]]
+        require_unmasked("limits", limits)
+        if limits is None:
+            start = self.field.neutral
+            size = np.max(np.abs(self.found[np.isfinite(self.found)] - start), initial=0.0) or 1.0
+            self.low, self.high = (start - size if self.field.signed else start), start + size
+        else:
+            with retold((TypeError, ValueError), "limits must be two numbers, got {!r}", limits):
+                low, high = limits
+            self.low, self.high = (require_finite_scalar("limits", x) for x in (low, high))
+            refuse(not self.low < self.high, "limits must increase, got {!r}", limits)
+        self._states, self.grids = states, every
 
     @cached_property
     def every(self) -> Array:
@@ -214,7 +192,7 @@ class Scenery:
     def beam_points(self, frames: Iterable[int], undeformed: bool = False) -> Array:
         """Points of the beams of frames, shape (2, n), deformed or not."""
         return np.concatenate([np.zeros((2, 0)), *(
-            b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
+            (b.reference if undeformed else b.deformed).reshape(2, -1)
             for k in frames for b in self.frames[k])], axis=1)
 
     def points(self, k: int, undeformed: bool = False) -> Array:
@@ -229,8 +207,7 @@ class Scenery:
 
     def outlines(self, k: int, undeformed: bool = False) -> list[Array]:
         """Closed lines around the beams of frame ``k``, shapes (n, 2), deformed or not."""
-        return [line for b in self.frames[k] for line in b.outline(
-            b.reference if undeformed else b.deformed, self.factor)]
+        return [line for b in self.frames[k] for line in b.outline(undeformed)]
 
     def cells(self, frames: Iterable[int] = (0,)) -> Array:
         """Quads of the beams of frames, as rows of points, (nc, 4)."""
@@ -330,6 +307,8 @@ class Sketch:
                  units: tuple[str, str] | None = None) -> None:
         self.ax, self.u, self.points, self.units = ax, u, points, units
         self.size = float(np.max(np.ptp(points, axis=0)))
+        #: The gid of artists.
+        self.kind = ""
         #: Where arrows and texts are.
         self.taken = np.full((1, 2), np.inf)
 
@@ -343,8 +322,9 @@ class Sketch:
             elif s.kind in ("support", "joint", "eigenstrain"):
                 key = s.kind, *(np.round(s.at[0].start / self.size, 6) + 0.0)
             before = one.get(key)
-            if s.kind == "support" and before is not None:
-                s = max(before, s, key=_ends)._replace(text=f"{before.text} {s.text}")
+            if s.kind == "support" and before is not None:  # the one with a known direction
+                s = max(before, s, key=lambda one: tuple(one.direction[0]) != (0.0, -1.0))._replace(
+                    text=f"{before.text} {s.text}")
             elif s.kind == "eigenstrain" and s.value:
                 texts = [] if before is None else before.text.split(", ")
                 texts.append(s.text + (f"{s.value:.6g}" if s.show else ""))
@@ -356,19 +336,25 @@ class Sketch:
             if not s.value and s.kind in LOADS:
                 continue
             at, mass = np.array([place(self.u) for place in s.at]), s.kind == "mass"
+            self.kind = s.kind
             if mark := {"joint": "o" if s.text == "hinge" else "s", "mass": "o",
                         "control": "D"}.get(s.kind):
-                self._mark(mark, at[0], s.kind, INK if mass else "white")
+                self._mark(mark, at[0], INK if mass else "white")
             elif s.kind not in NOTES:
                 getattr(self, "_" + s.kind.replace(" ", "_"))(s, at, largest)
             if s.kind in (*NOTES, "mass", "control", "torsional spring"):
                 self._beside(f"{s.text}{s.value:.6g}" if mass else s.text, at[0], LOAD if (
-                    s.kind in LOADS) else INK if mass else HOLD, s.kind)
+                    s.kind in LOADS) else INK if mass else HOLD)
 
-    def names(self, places: Iterable[tuple[str, Array]]) -> None:
-        """Write names at positions (2,)."""
-        for name, at in places:
-            self._text(name, at, (1, -1), INK, "name", 10, style="italic")
+    def names(self, members: Iterable[Grid]) -> None:
+        """Write the names of members in their middle; of beams in a section off it."""
+        self.kind = "name"
+        for grid in members:
+            x = grid.x
+            if grid.rows > 1:
+                columns = x.reshape(2, grid.elements[-1] + 1, -1, grid.rows)
+                x = columns[:, columns.shape[1] // 4, columns.shape[2] // 2]
+            self._text(grid.name, np.mean(x, axis=1), (1, -1), INK, 10, style="italic")
 
     # loads
 
@@ -390,14 +376,13 @@ class Sketch:
         k = [*clear, *order][0] if np.ptp(sizes) < 1e-9 else int(np.argmax(sizes))
         for tip, tail in zip(tips, tails):
             if np.hypot(*(tip - tail)) > 0.005 * self.size:
-                self._arrow(tail, tip, kind=s.kind)
+                self._arrow(tail, tip)
         if len(at) > 1:
-            self._line(tails, s.kind, LOAD, 0.8)
+            self._line(tails, LOAD, 0.8)
             self.taken = np.vstack([self.taken, 0.5 * (tails[1:] + tails[:-1])])
         if s.show:
             free, other = (tips[0], tails[0]) if tips is out else (tails[k], tips[k])
-            self._text(self._value(s), free,
-                       free - other, LOAD, s.kind)
+            self._text(self._value(s), free, free - other, LOAD)
 
     def _value(self, s):
         """Text and value, with the unit of a force or moment."""
@@ -408,19 +393,19 @@ class Sketch:
         """One arrow to the right of the picture for all members of one gravity."""
         foot = np.max(self.points, axis=0) + [0.2 * self.size, 0.0]
         tip = foot + ARROW * self.size * np.array(s.direction[0]) * np.sign(s.value)
-        self._arrow(foot, tip, kind=s.kind, color=MUTED)
-        self._text(s.text + rounded(abs(s.value), ""), tip, tip - foot, MUTED, s.kind)
+        self._arrow(foot, tip, color=MUTED)
+        self._text(s.text + rounded(abs(s.value), ""), tip, tip - foot, MUTED)
 
     def _moment(self, s, at, largest):
         motor, color = s.kind == "motor", HOLD if s.kind == "motor" else LOAD
         angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
         arc = at[0] + 1.5 * SIZE * self.size * np.column_stack([np.cos(angle), np.sin(angle)])
-        self._arrow(*arc, kind=s.kind, color=color)
-        self._beside("angle(t)" if motor else s.text or self._value(s), at[0], color, s.kind)
+        self._arrow(*arc, color=color)
+        self._beside("angle(t)" if motor else s.text or self._value(s), at[0], color)
 
     _motor = _moment
 
-    def _beside(self, text, at, color, kind):
+    def _beside(self, text, at, color):
         """Write in a corner about a position, far from bodies and other texts."""
         r = 1.1 * SIZE * self.size
 
@@ -432,7 +417,7 @@ class Sketch:
 
         far, away = max([(k, (x, y)) for k in (1, 2, 3) for y in (1, -1) for x in (1, -1)],
                         key=room)
-        self._text(text, at + far * r * np.array(away), away, color, kind)
+        self._text(text, at + far * r * np.array(away), away, color)
 
     def _box(self, text, at, away):
         x, y = np.array(away) / (np.hypot(*away) or 1.0)
@@ -448,7 +433,7 @@ class Sketch:
         held, base, r = set(s.text.split()), at[0], SIZE * self.size
         single, (x, y) = {"x", "y"} - held, s.direction[0]
         if len(single) == 2:
-            return self._mark("s", base, s.kind)
+            return self._mark("s", base)
         if single or "angle" not in held:  # upright, or sideways where only x is held
             x, y = (0.0, 1.0 if y > 0.7 else -1.0) if "y" in held else (1.0 if x > 0.7 else -1.0, 0)
         d, across, wide = np.array([x, y]), np.array([-y, x]), 1.2 * r
@@ -459,25 +444,25 @@ class Sketch:
             wide = max(wide, 1.3 * half * (half < 0.15 * self.size))
         if "angle" not in held:
             base = base + 1.5 * r * d
-            self._line([at[0], base + 0.8 * r * across, base - 0.8 * r * across, at[0]], s.kind)
+            self._line([at[0], base + 0.8 * r * across, base - 0.8 * r * across, at[0]])
         elif single:
-            self._line([base - wide * across, base + wide * across], s.kind)
-        self._ground(base + 0.4 * r * d * len(single), d, wide, s.kind)
+            self._line([base - wide * across, base + wide * across])
+        self._ground(base + 0.4 * r * d * len(single), d, wide)
 
-    def _ground(self, foot, d, wide, kind):
+    def _ground(self, foot, d, wide):
         """A line across d with hatching behind it."""
         across, r = np.array([-d[1], d[0]]), SIZE * self.size
-        self._line([foot - wide * across, foot + wide * across], kind)
+        self._line([foot - wide * across, foot + wide * across])
         for k in np.linspace(-wide, wide - 0.4 * r, max(6, round(2 * wide / r))):
             at = foot + k * across
-            self._line([at, at + 0.45 * r * (d - across)], kind, HOLD, 0.8)
+            self._line([at, at + 0.45 * r * (d - across)], HOLD, 0.8)
 
     def _slider(self, s, at, largest):
         d, r = np.array(s.direction[0]), SIZE * self.size
         for side in (-0.6, 0.6):
             foot = at[0] + side * r * np.array([-d[1], d[0]])
-            self._line([foot - 1.5 * r * d, foot + 1.5 * r * d], s.kind)
-        self._mark("o", at[0], s.kind)
+            self._line([foot - 1.5 * r * d, foot + 1.5 * r * d])
+        self._mark("o", at[0])
 
     def _spring(self, s, at, largest):
         a, b = at
@@ -487,44 +472,44 @@ class Sketch:
             across = np.array([-along[1], along[0]]) / length
             x = np.array([0, 0.2, *np.linspace(0.25, 0.75, 8), 0.8, 1])
             y = np.array([0, 0, *np.tile([1, -1], 4), 0, 0])
-            self._line(a + np.outer(x, along) + r * np.outer(y, across), s.kind)
+            self._line(a + np.outer(x, along) + r * np.outer(y, across))
             for place, end, outwards in zip(s.at, at, (-along, along)):
                 if not place.dofs.size:
-                    self._ground(end, outwards / length, 1.2 * r, s.kind)
+                    self._ground(end, outwards / length, 1.2 * r)
             if s.text:
-                self._text(s.text, 0.5 * (a + b) + r * across, across, HOLD, s.kind)
+                self._text(s.text, 0.5 * (a + b) + r * across, across, HOLD)
 
     def _foundation(self, s, at, largest):
         foot = at[0] + 2 * SIZE * self.size * np.array(s.direction[0])
         self._spring(s._replace(at=(s.at[0], Vector(foot)), text=""), [at[0], foot], largest)
         if s.text:
-            self._text(s.text, foot, s.direction[0], HOLD, s.kind, 8)
+            self._text(s.text, foot, s.direction[0], HOLD, 8)
 
     def _torsional_spring(self, s, at, largest):
         angle = np.linspace(0, 4 * np.pi, 60)
         spiral = SIZE * self.size * angle / angle[-1] * [np.cos(angle), np.sin(angle)]
-        self._line(at[0] + spiral.T, s.kind)
+        self._line(at[0] + spiral.T)
 
     # artists
 
-    def _arrow(self, *points, kind, color=LOAD):
+    def _arrow(self, *points, color=LOAD):
         from matplotlib.patches import FancyArrowPatch
         from matplotlib.path import Path
 
         self.ax.add_patch(FancyArrowPatch(
             path=Path(points), arrowstyle="-|>", mutation_scale=9, color=color, lw=1.2, zorder=5,
-            gid=kind))
+            gid=self.kind))
         self.ax.update_datalim(points)
         self.taken = np.vstack([self.taken, points, 0.5 * np.add(points[0], points[-1])])
 
-    def _line(self, points, kind, color=HOLD, lw=1.2):
-        self.ax.plot(*np.transpose(points), color=color, lw=lw, zorder=4, gid=kind,
+    def _line(self, points, color=HOLD, lw=1.2):
+        self.ax.plot(*np.transpose(points), color=color, lw=lw, zorder=4, gid=self.kind,
                      solid_capstyle="round")
 
-    def _mark(self, marker, at, kind, face="white"):
-        self.ax.plot(*at, marker, mfc=face, mec=HOLD, ms=6, mew=1.2, zorder=6, gid=kind)
+    def _mark(self, marker, at, face="white"):
+        self.ax.plot(*at, marker, mfc=face, mec=HOLD, ms=6, mew=1.2, zorder=6, gid=self.kind)
 
-    def _text(self, text, at, away, color, kind, far=4, **options):
+    def _text(self, text, at, away, color, far=4, **options):
         from matplotlib.patheffects import withStroke
 
         x, y = np.array(away) / (np.hypot(*away) or 1.0)
@@ -533,11 +518,6 @@ class Sketch:
         self.taken = np.vstack([self.taken, box])
         self.ax.annotate(
             text, at, (far * x, far * y), textcoords="offset points", fontsize=8, color=color,
-            gid=kind, zorder=7, path_effects=[withStroke(linewidth=2, foreground="white")],
+            gid=self.kind, zorder=7, path_effects=[withStroke(linewidth=2, foreground="white")],
             ha="left" if x > 0.4 else "right" if x < -0.4 else "center",
             va="bottom" if y > 0.4 else "top" if y < -0.4 else "center", **options)
-
-
-def _ends(s):
-    """Of two supports the one with a known outward direction."""
-    return tuple(s.direction[0]) != (0.0, -1.0)
