@@ -219,12 +219,14 @@ def warn_of_meetings(system: Any) -> None:
     group = connected_components(sparse.coo_array(
         (np.ones(len(rows)), (np.concatenate([columns, *others]), system.N + rows)),
         (size, size)), directed=False)[1]
-    for contact, x, parts in found:
-        of_parts = [group[2 * contact.dofs[at][:, None] + (0, 1)] for _, at in parts]
-        if not np.isin(*of_parts).any():
+    told = set()
+    for contact, x, ((i, a), (j, b)) in found:
+        one, other = (group[2 * contact.dofs[at][:, None] + (0, 1)] for at in (a, b))
+        if (i, j) not in told and not np.isin(one, other).any():
+            told |= {(i, j), (j, i)}
             x, names = np.round(x + contact.origin, 9) + 0.0, [
-                (who(system.members, k) or " of the beam").removeprefix(" of ") for k, _ in parts]
-            names[1:] = ["itself"] if parts[0][0] == parts[1][0] else names[1:]
+                (who(system.members, k) or " of the beam").removeprefix(" of ") for k in (i, j)]
+            names[1:] = ["itself"] if i == j else names[1:]
             warn(f"{names[0]} meets {names[1]} near ({x.real:.2g}, {x.imag:.2g}) in the "
                  "reference configuration, and nothing joins them there: "
                  f"{contact!r} takes them for joined, and they do not touch within three heights "
