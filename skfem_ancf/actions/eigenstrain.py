@@ -29,16 +29,6 @@ from .symbols import Symbol, middle
 SECTION, ROUND_OFF = 6, 1e-12
 
 
-def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
-    """An eigenstrain where a term samples the strain, (ns, nelements)."""
-    term, layer, out = integral.term, integral.layer, []
-    for row, name in enumerate(COMPONENTS):
-        xi, eta = term.nodes(name), term.section_nodes
-        X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
-        values = eigen.of_layer(layer, *beam.across.coordinates(X))[row]
-        out.append(values - unmatched(beam, eigen, layer, X) if name == "yy" else values)
-    return np.concatenate(out, axis=1).T
-
 
 def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None = None) -> Array:
     """The part of eps_yy that a section develops freely and its element cannot represent."""
@@ -118,9 +108,7 @@ class EigenStrain(Load):
 
     constant = False
     prestress = True
-    # of a bound one
-    _distribution: Any = None
-    # strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
+    # of a bound one: strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
     _strains: Any = None
     _stresses: Any = None
     #: True for nonlinear laws, whose forces are not proportional to the eigenstrain.
@@ -151,10 +139,9 @@ class EigenStrain(Load):
         timed = {name: f for name, f in given.items() if takes(f, 3)}
         out: list[Item] = []
         for name, f in timed.items():
-            for g, c in products(self.given[name], f, beam):
+            for g, c in products(self.given[name], f, beam, self.amplitude):
                 only = {**dict.fromkeys(given), name: g}
-                amplitude = Amplitude(c.times(self.amplitude))
-                out.append(self._with(beam=k, amplitude=amplitude, **only))
+                out.append(self._with(beam=k, amplitude=Amplitude(c), **only))
         if not timed or any(f is not None for name, f in given.items() if name not in timed):
             out.append(self._with(beam=k, **dict.fromkeys(timed)))
         return out
@@ -163,17 +150,23 @@ class EigenStrain(Load):
 
     def bind(self, beam: Beam) -> Load:
         bound = cast("EigenStrain", super().bind(beam))
-        bound._distribution = Distribution(eigen=bound)
-        function = getattr(self.amplitude, "function", None)
+        # elements that remember have the strain minus the eigenstrain
+        bound._distribution = Distribution() if remembers(beam) else Distribution(eigen=bound)
+        function, kernel = getattr(self.amplitude, "function", None), beam.kernel
         if isinstance(function, Coefficient):
             bound.at_rest = function(1.0)
-        kernel = beam.kernel
-        if remembers(beam):  # its elements have the strain minus the eigenstrain
-            bound._distribution = Distribution()
         if not beam.has_sections:
             bound.eigen_stresses, bound._stresses = _of_fibres(beam, self)
             return bound
-        bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
+        bound._strains = []
+        for one in kernel.integrals:  # where a term samples the strain, (ns, nelements)
+            term, layer, rows = one.term, one.layer, []
+            for row, name in enumerate(COMPONENTS):
+                xi, eta = term.nodes(name), term.section_nodes
+                X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+                values = self.of_layer(layer, *beam.across.coordinates(X))[row]
+                rows.append(values - unmatched(beam, self, layer, X) if name == "yy" else values)
+            bound._strains.append(np.concatenate(rows, axis=1).T)
         bound._stresses = list(map(stresses_of, kernel.elements, bound._strains))
         # nonlinear laws have the strains at the points in place of stresses
         bound.eigen_stresses = [
@@ -195,7 +188,7 @@ class EigenStrain(Load):
 
     def element_forces(self, u: Array, factor: float = 1.0) -> Array:
         """Element forces (nelements, nb, 2) at u (N,)."""
-        return -self.beam.kernel.eigenstrain_forces(self._scaled_stresses(factor), u)
+        return -self.beam.kernel.eigenstrain_forces([-factor * T for T in self.eigen_stresses], u)
 
     def small_forces(self, factor: float = 1.0) -> Array:
         """As :meth:`element_forces` at u = 0, linear in the strain."""
@@ -204,20 +197,17 @@ class EigenStrain(Load):
         return self.beam.kernel.forces_of([factor * T for T in self._stresses],
                                           np.zeros(self.beam.N))
 
-    def _scaled_stresses(self, factor):
-        return [-factor * given for given in self.eigen_stresses]
 
     def force(self, u: Array) -> Array:
         return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        kernel = self.beam.kernel
-        return -kernel.scatter(kernel.eigenstrain_forces(self._scaled_stresses(self._size), u0, u1))
+        kernel, stresses = self.beam.kernel, [-self._size * T for T in self.eigen_stresses]
+        return -kernel.scatter(kernel.eigenstrain_forces(stresses, u0, u1))
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        beam = self.beam
-        K = beam.kernel.eigenstrain_tangents(self._scaled_stresses(self._size), u)
-        return *entries_of(element_dofs(beam)), -K.ravel()
+        K = self.beam.kernel.eigenstrain_tangents([-self._size * T for T in self.eigen_stresses], u)
+        return *entries_of(element_dofs(self.beam)), -K.ravel()
 
     def potential(self, u: Array) -> float:
         if self._strains is not None:  # minus the integral of W(E) - W(E - factor E0)
@@ -236,8 +226,6 @@ class EigenStrain(Load):
                     for t, T in zip(self.beam.kernel.tables, self.eigen_stresses)
                     if t.law.kind == LINEAR)
 
-    def distribution(self, u: Array) -> Distribution:
-        return self._distribution
 
     # fields
 
@@ -367,16 +355,17 @@ def _resultants(beam, eigen, rules):
 # functions of time too
 
 
-def products(name: str, function: Callable[..., Any], beam: Beam
+def products(name: str, function: Callable[..., Any], beam: Beam, amplitude: TimeFunction
              ) -> "list[tuple[Callable[..., Any], Coefficient]]":
     """A function (x, y, t) as a sum of products of functions of (x, y) and of t, exact where such a
     sum exists: by empirical interpolation at some times and as many places (Barrault, Maday,
-    Nguyen, Patera: "An empirical interpolation method", Comptes Rendus Mathematique 339 (2004))."""
+    Nguyen, Patera: "An empirical interpolation method", Comptes Rendus Mathematique 339 (2004)).
+    Those of t are multiplied by the amplitude."""
     X = np.array(np.meshgrid(np.linspace(0.02, 0.97, 7), np.linspace(0.01, 0.98, 9))
                  ).reshape(2, -1)
     x, y = (c.ravel() for c in beam.across.coordinates(X))
     times = np.append(np.linspace(0.0, 1.0, 33), np.geomspace(1e-3, 1e3, 40) * 1.0371)
-    at = [_AtTime(function, float(t)) for t in times]
+    at = [partial(_at_time, function, float(t)) for t in times]
     F = np.array([_evaluated(f"{name}(t={t:g})", f, x, y) for t, f in zip(times, at)])
     size, left, chosen, places = np.max(np.abs(F)), F.copy(), [], []
     while np.max(np.abs(left)) > CLOSE * size:
@@ -388,35 +377,26 @@ def products(name: str, function: Callable[..., Any], beam: Beam
                "an amplitude each", name, MOST)
         left = F - np.linalg.solve(F[np.ix_(chosen, places)].T, F[:, places].T).T @ F[chosen]
     inverse = np.linalg.inv(F[np.ix_(chosen, places)])
-    return [(at[k], Coefficient(name, function, x[places], y[places], inverse[:, j]))
+    return [(at[k], Coefficient(name, function, x[places], y[places], inverse[:, j], amplitude))
             for j, k in enumerate(chosen)]
 
 
-class _AtTime:
-    """A function (x, y, t) at fixed t."""
-
-    def __init__(self, function, t):
-        self.function, self.t = function, t
-
-    def __call__(self, x, y):
-        return self.function(x, y, self.t)
+def _at_time(function, t, x, y):
+    return function(x, y, t)
 
 
 class Coefficient:
     """The time factor of one product: weighted values of the function at some places."""
 
     def __init__(self, name: str, function: Callable[..., Any], x: Array, y: Array,
-                 weights: Array, amplitude: TimeFunction = None) -> None:
+                 weights: Array, amplitude: TimeFunction) -> None:
         self.name, self.function, self.x, self.y, self.weights = name, function, x, y, weights
         self.amplitude = amplitude
 
-    def times(self, amplitude: TimeFunction) -> "Coefficient":
-        """The product with a function of time."""
-        return Coefficient(self.name, self.function, self.x, self.y, self.weights, amplitude)
 
     def __call__(self, t):
         if np.ndim(t):
             return np.array([self(s) for s in t])
-        at = _AtTime(self.function, float(t))
+        at = partial(_at_time, self.function, float(t))
         found = _evaluated(f"{self.name}(t={t:g})", at, self.x, self.y)
         return float(found @ self.weights) * (1.0 if self.amplitude is None else self.amplitude(t))

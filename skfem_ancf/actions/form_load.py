@@ -12,8 +12,8 @@ from skfem.element import DiscreteField
 from ..beam import AXIS, BODY, Distribution, Domain, Sampled, WhichMember, facets_along
 from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss, refuse,
                     require_finite, require_flag, require_slope, shown, warnings_as_errors)
-from .energy import Density, points_of
-from .bound import at_generic_displacements
+from .energy import Density, DensityPoints
+from .bound import COMPLEX, at_generic_displacements
 from .loads import DeadLoad
 
 logger = logging.getLogger(__name__)
@@ -23,7 +23,6 @@ STEP = 1e-6
 SYMMETRIC, OTHER = 1e-6, 0.7310585786
 #: Gauss points for the work from the reference configuration, and in a time step.
 WORK, MEAN = 6, 3
-_COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
 class _Parameters(FormExtraParams):
@@ -106,16 +105,15 @@ class FormLoad(Density):
                 scaled=self.scaled)
         basis = (beam.exact_basis() if self.boundary is None else
                  beam.facet_basis(self.boundary))
-        fields = [b[0] for b in basis.basis[::2]]
-        part = points_of(basis.element_dofs.T, np.asarray(basis.default_parameters()["x"]),
-                         basis.dx, np.array([f[0] for f in fields]),
-                         np.array([f.grad[0] for f in fields]), None)
+        functions = np.array([(f[0], *f.grad[0]) for f, in basis.basis[::2]])
+        part = DensityPoints(basis.element_dofs.T, np.asarray(basis.default_parameters()["x"]),
+                             basis.dx, np.ascontiguousarray(functions.transpose(2, 0, 3, 1)))
         bound = self._with(beam=beam, _parts=[part], _basis=basis)
         P, w = bound._evaluated(bound._variables(np.zeros(beam.N), part))
         require_finite(f"the force of {bound!r}", P)
         used = vars(w).get("asked", set()) & {"r", "F", "t"}
         if not used:
-            dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._distribution(P))
+            dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._acting(P))
             return dead._with(scaled=self.scaled)
         refuse(not beam.has_sections, "a form with w.r acts on elements with sections, as "
                "ElementBeamANCF(2), and not on {!r}", beam)
@@ -146,7 +144,7 @@ class FormLoad(Density):
         """Values of a user-defined form at the points."""
         what = f"the form of a load, form({'u, ' * (len(args) == 3)}v, w),"
         hint = "it must return a real number at each point, as v[1]"
-        with explained("{} fails", hint, CallbackError, what), warnings_as_errors(_COMPLEX):
+        with explained("{} fails", hint, CallbackError, what), warnings_as_errors(COMPLEX):
             found = np.empty(self._basis.dx.shape)
             try:
                 found[:] = form(*args)
@@ -214,9 +212,9 @@ class FormLoad(Density):
 
     def distribution(self, u: Array) -> Distribution | None:
         part, = self._parts
-        return self._distribution(-self._slope(self._variables(u, part), part))
+        return self._acting(-self._slope(self._variables(u, part), part))
 
-    def _distribution(self, P):
+    def _acting(self, P):
         """Distribution of a force over the body; None if it acts on derivatives."""
         basis, f = self._basis, P[:2]
         if np.any(P[2:]):

@@ -167,32 +167,26 @@ def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) 
     return found
 
 
-def members_at(layout: Layout, at: ArrayLike) -> list[int]:
-    """Numbers of the beams and bodies that contain a material point."""
-    found = []
-    if not isinstance(at, str):
+def members_at(layout: Layout, at: ArrayLike, nearest: bool = False) -> list[int]:
+    """Numbers of the beams and bodies that contain a material point; with ``nearest``, if all are
+    beams, of those with the nearest axes."""
+    found, beams, named = [], [], isinstance(at, str)
+    if not named:
         at = as_point(at)
     for k, member in enumerate(layout.members):
         if not isinstance(member, Beam):
-            if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
+            if not named and member.contains(np.reshape(at, (2, 1)))[0]:
                 found.append(k)
             continue
         try:
-            locate(member, at)
+            beams.append((k, member, *locate(member, at)))
         except MeshError:
             continue
         found.append(k)
-    return found
-
-
-def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
-    """The members ``found`` with the nearest axes if all are beams, else all."""
-    beams: list[Any] = [layout.members[k] for k in found]
-    if len(found) < 2 or isinstance(at, str) or not all(isinstance(b, Beam) for b in beams):
+    if not nearest or named or len(found) < 2 or len(beams) < len(found):
         return found
-    where = [(b, *locate(b, at)) for b in beams]
-    off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for b, e, X in where]
-    return [k for k, b, d in zip(found, beams, off) if d <= min(off) + b.finder.equal]
+    off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for _, b, e, X in beams]
+    return [k for (k, b, *_), d in zip(beams, off) if d <= min(off) + b.finder.equal]
 
 
 def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
@@ -209,8 +203,7 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
     found = members_at(layout, place) if isinstance(place, str) else []
     if not found:
         place = require_finite("a point of a spring or a joint", place, (2,))
-        found = members_at(layout, place)
-    found = nearest_of(layout, place, found)
+        found = members_at(layout, place, nearest=True)
     if len(found) > 1 and layout.nodes is not None:  # they share a node
         found = [k for k, *_ in layout.nodes.ends_at(layout, place)][:1] or found
     names = [layout.members[k].name or k for k in found]

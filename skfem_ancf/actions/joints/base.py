@@ -1,7 +1,6 @@
 """Base class of joints: constraint equations on points and sections; parts of joints."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,8 +8,7 @@ import numpy as np
 from ...beam import Layout, RigidBody
 from ...core import Array, ArrayLike, InputError, explained, is_builtin, require_finite, shown
 from ...mesh.places import is_point
-from ..bound import (BoundConstraint, at_generic_displacements, require_derivatives,
-                     require_entries, user_parts)
+from ..bound import BoundConstraint, require_derivatives, require_entries, user_parts
 from ..item import Item
 from ..places import Vector, products
 
@@ -86,8 +84,7 @@ class Joint(BoundConstraint, Item):
             if second is not None:
                 i, j, values = second
                 require_entries(f"curvature of {bound!r}", i, j, values, n)
-            at_generic_displacements(partial(require_derivatives, bound, layout.sizes),
-                                     layout.sizes)
+            require_derivatives(bound, layout.sizes)
             return [bound, *user_parts(bound, layout)]
 
     def __repr__(self) -> str:
@@ -205,11 +202,13 @@ class UnitDirector(ComposedJoint):
 class IndependentPart(Joint):
     """The independent equations of a bound joint, by increasing numbers."""
 
+    turning = False
+
     def __init__(self, joint: Joint, kept: Array) -> None:
         self.joint, self.kept = joint, kept
         self.equations = tuple(joint.equations[k] for k in kept)
         self.constant, self.moving, self.name = joint.constant, joint.moving, joint.name
-        self.tabled = joint.tabled and is_builtin(joint)
+        self.tabled, self.turning = joint.tabled and is_builtin(joint), joint.turning
         self._number = np.full(len(joint.equations), -1)
         self._number[kept] = np.arange(len(kept))
         self._freeze()
@@ -245,9 +244,6 @@ class IndependentPart(Joint):
     def lost(self, u: Array) -> str:
         return self.joint.lost(u)
 
-    @property
-    def turning(self) -> bool:
-        return self.joint.turning
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.slope_entries(times, N))
