@@ -182,9 +182,30 @@ class Material(Immutable):
         refuse(not self._fits("stress", "energy"), "{} overrides energy and not stress(strain), "
                "its derivative", type(self).__name__)
         law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
-        if not is_builtin(self):
-            _require_derivatives(law, self)
-        return law if k_s == 1.0 else ShearCorrected(law, k_s)
+        corrected = law if k_s == 1.0 else ShearCorrected(law, k_s)
+        if is_builtin(self):
+            return corrected
+        kind = type(self).__name__
+        E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
+        try:
+            stress, energy = (along(lambda s, of=of: of(E + s * d))
+                              for of in (law.stress, law.energy))
+            D, D0 = (np.asarray(law.moduli(strain)) for strain in (E, 0.0 * E))
+        except NotImplementedError:
+            raise InputError(f"{kind} must define energy(strain) and stress(strain)") from None
+        except TypeError:
+            raise InputError(f"{kind}: the derivative of stress cannot be found by the complex "
+                             "step: define moduli(strain), too") from None
+        for moduli, name in ((D, "moduli(strain)"),
+                             (D.swapaxes(0, 1), "moduli(strain), transposed,")):
+            require_slope(f"{name} of {kind}", "stress(strain)", stress,
+                          np.einsum("ij...,j...->i...", moduli, d))
+        require_slope(f"stress(strain) of {kind}", "energy(strain)", energy,
+                      np.sum(stress[1] * d, axis=0))
+        lowest, *_, highest = np.linalg.eigvalsh(D0.reshape(3, 3, -1)[..., 0])
+        refuse(lowest < -1e-6 * abs(highest), "moduli(strain) of {} at zero strain must not be "
+               "negative, got the eigenvalue {:.6g}", kind, lowest)
+        return corrected
 
     def _require_number(self):
         refuse(callable(self.E), "the modulus E of {!r} varies: use replace(E=number)", self)
@@ -293,27 +314,6 @@ class ShearCorrected:
         D = self.base.moduli(self._scaled(strain))
         return D * np.outer(self.scale, self.scale).reshape((3, 3) + (1,) * (D.ndim - 2))
 
-
-def _require_derivatives(law, material):
-    E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
-    try:
-        stress, energy = (along(lambda s, of=of: of(E + s * d)) for of in (law.stress, law.energy))
-        D, D0 = (np.asarray(law.moduli(strain)) for strain in (E, 0.0 * E))
-    except NotImplementedError:
-        raise InputError(f"{type(material).__name__} must define energy(strain) and "
-                         "stress(strain)") from None
-    except TypeError:
-        raise InputError(f"{type(material).__name__}: the derivative of stress cannot be found by "
-                         "the complex step: define moduli(strain), too") from None
-    kind = type(material).__name__
-    for moduli, name in ((D, "moduli(strain)"), (D.swapaxes(0, 1), "moduli(strain), transposed,")):
-        require_slope(f"{name} of {kind}", "stress(strain)", stress,
-                      np.einsum("ij...,j...->i...", moduli, d))
-    require_slope(f"stress(strain) of {kind}", "energy(strain)", energy,
-                  np.sum(stress[1] * d, axis=0))
-    lowest, *_, highest = np.linalg.eigvalsh(D0.reshape(3, 3, -1)[..., 0])
-    refuse(lowest < -1e-6 * abs(highest), "moduli(strain) of {} at zero strain must not be "
-           "negative, got the eigenvalue {:.6g}", type(material).__name__, lowest)
 
 
 class OverriddenLaw:

@@ -56,13 +56,6 @@ class Voce(Immutable):
         return "Voce({:g}, {:g}, {:g})".format(*self)
 
 
-def _by_plane(k: int) -> Any:
-    def function(self: Any) -> Any:
-        """One of :data:`FUNCTIONS`."""
-        return FUNCTIONS[self.plane][k]
-
-    return property(function)
-
 
 class ElasticPlastic(HistoryMaterial):
     """Von Mises plasticity with an associated flow rule, in plane stress or plane strain.
@@ -122,7 +115,20 @@ class ElasticPlastic(HistoryMaterial):
         refuse(self.nu == 0.5, "ElasticPlastic needs nu below 0.5, got 0.5: use 0.49")
         self.yield_stress = require_positive("yield_stress", yield_stress)
         self.kinematic = require_not_negative("kinematic", kinematic, False)
-        self.hardening = self._checked(hardening)
+        refuse(isinstance(hardening, str), "hardening is a number, a table (n, 2) or "
+               "Voce(saturation, rate), got {!r}", hardening)
+        if isinstance(hardening, Voce):
+            self.hardening: Any = hardening
+        elif np.ndim(hardening) == 0:
+            self.hardening = require_not_negative("hardening", hardening, False)
+        else:
+            self.hardening = table = require_finite("hardening", hardening, (None, 2))
+            rise, wrong = np.diff(table, axis=0), len(table) < 2 or table[0, 0] != 0.0
+            refuse(wrong or np.any(rise[:, 0] <= 0.0) or np.any(rise[:, 1] < 0.0) or abs(
+                table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress,
+                "hardening as a table has rows (plastic strain, yield stress), strains increasing "
+                "from 0, stresses not decreasing from yield_stress = {:g}; got {!r}",
+                self.yield_stress, table)
 
     @classmethod
     def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> "Self":
@@ -137,21 +143,6 @@ class ElasticPlastic(HistoryMaterial):
         strength = values_of(name, units)[0]["strength"]
         return super().named(name, units, **{"yield_stress": strength, **changes})
 
-    def _checked(self, hardening):
-        if isinstance(hardening, Voce):
-            return hardening
-        refuse(isinstance(hardening, str), "hardening is a number, a table (n, 2) or "
-               "Voce(saturation, rate), got {!r}", hardening)
-        if np.ndim(hardening) == 0:
-            return require_not_negative("hardening", hardening, False)
-        table = require_finite("hardening", hardening, (None, 2))
-        rise = np.diff(table, axis=0)
-        refuse(len(table) < 2 or table[0, 0] != 0.0 or np.any(rise[:, 0] <= 0.0) or np.any(
-            rise[:, 1] < 0.0) or abs(table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress,
-            "hardening as a table has rows (plastic strain, yield stress), strains increasing from "
-            "0, stresses not decreasing from yield_stress = {:g}; got {!r}", self.yield_stress,
-            table)
-        return table
 
     def __repr__(self) -> str:
         return super().__repr__()[:-1] + f", yield_stress={self.yield_stress:g})"
@@ -175,7 +166,8 @@ class ElasticPlastic(HistoryMaterial):
         return np.concatenate([[self.E, self.nu, self.kinematic, self.yield_stress, *h],
                                rows.ravel()])
 
-    point, stored, fibre, fibre_stored = map(_by_plane, range(4))
+    point, stored, fibre, fibre_stored = (
+        property(lambda self, k=k: FUNCTIONS[self.plane][k]) for k in range(4))
 
     def out_of_plane(self, strain: Array, history: Array, stress: Array) -> tuple[Array, Array]:
         e, S = super().out_of_plane(strain, history, stress)
