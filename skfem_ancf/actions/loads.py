@@ -8,10 +8,9 @@ import numpy as np
 from scipy import sparse
 
 from ..beam import (AXIS, Beam, Distribution, Domain, Layout, RigidBody, Sampled, WhichBeam,
-                    WhichMember, add_nodal, divided, on_body, on_facets, on_points,
-                    stations_of_vector, surfaces_of)
+                    WhichMember, add_nodal, direction, divided, element_dofs, entries_of, on_body,
+                    on_facets, on_points, stations_of_vector, surfaces_of)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
-from ..beam.kinematics import direction, element_dofs, entries_of
 from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,
                     along, ask_field, ask_number, gauss, is_builtin, read_only, refuse, refuse_any,
                     require_finite, require_finite_scalar, require_function, require_slope, sample,

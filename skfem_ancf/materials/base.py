@@ -188,8 +188,8 @@ class Material(Immutable):
         kind = type(self).__name__
         E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
         try:
-            stress, energy = (along(lambda s, of=of: of(E + s * d))
-                              for of in (law.stress, law.energy))
+            stress = along(lambda s: law.stress(E + s * d))
+            energy = along(lambda s: law.energy(E + s * d))
             D, D0 = (np.asarray(law.moduli(strain)) for strain in (E, 0.0 * E))
         except NotImplementedError:
             raise InputError(f"{kind} must define energy(strain) and stress(strain)") from None

@@ -9,17 +9,11 @@ from ..core import (Array, ArrayLike, Immutable, refuse, require_finite, require
                     require_positive)
 from .history import ACROSS, HistoryMaterial
 from .library import values_of
-from .return_mapping import (fibre, fibre_energy, hardened, plane_strain, plane_strain_energy,
-                             plane_strain_fibre, plane_strain_fibre_energy, plane_stress,
-                             plane_stress_energy)
+from .return_mapping import FUNCTIONS, hardened
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-#: Functions of a point and of a fibre, with their stored energies.
-FUNCTIONS = {"stress": (plane_stress, plane_stress_energy, fibre, fibre_energy),
-             "strain": (plane_strain, plane_strain_energy, plane_strain_fibre,
-                        plane_strain_fibre_energy)}
 #: History variables of a point.
 VARIABLES = {"plastic_strain": 3, "back_stress": 3, "accumulated": 1}
 
@@ -55,6 +49,10 @@ class Voce(Immutable):
     def __repr__(self) -> str:
         return "Voce({:g}, {:g}, {:g})".format(*self)
 
+
+
+def _by_plane(k):
+    return property(lambda self: FUNCTIONS[self.plane][k])
 
 
 class ElasticPlastic(HistoryMaterial):
@@ -166,8 +164,7 @@ class ElasticPlastic(HistoryMaterial):
         return np.concatenate([[self.E, self.nu, self.kinematic, self.yield_stress, *h],
                                rows.ravel()])
 
-    point, stored, fibre, fibre_stored = (
-        property(lambda self, k=k: FUNCTIONS[self.plane][k]) for k in range(4))
+    point, stored, fibre, fibre_stored = map(_by_plane, range(4))
 
     def out_of_plane(self, strain: Array, history: Array, stress: Array) -> tuple[Array, Array]:
         e, S = super().out_of_plane(strain, history, stress)

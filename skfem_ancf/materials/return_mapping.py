@@ -253,3 +253,9 @@ def plane_strain_fibre_energy(c, strain, history):
     """Stored energy of a fibre in plane strain."""
     e = strain[0]
     return plane_stress_energy(c, (e, 0.0 * e, 0.0 * e), across_width(history))
+
+
+#: Functions of a point and of a fibre, with their stored energies.
+FUNCTIONS = {"stress": (plane_stress, plane_stress_energy, fibre, fibre_energy),
+             "strain": (plane_strain, plane_strain_energy, plane_strain_fibre,
+                        plane_strain_fibre_energy)}

@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
-from ...beam import Beam, Layout
-from ...beam.kinematics import direction
+from ...beam import Beam, Layout, direction
 from ...core import Array, MeshError, sample
 from ...mesh.frame_graph import FrameGraph
 from ..places import Vector
@@ -280,7 +278,7 @@ class Nodes(Joint):
         n = len(self.nodes) // 2
         links = sparse.coo_array((np.ones(len(self.turned)),
                                   (self.turned // 2, self.leader[self.turned] // 2)), (n, n))
-        return np.asarray(connected_components(links, directed=False)[1])
+        return np.asarray(sparse.csgraph.connected_components(links, directed=False)[1])
 
     def fixed_motions(self, parts: Array, origin: Array, size: float, number: int) -> Any:
         """Constraints on rigid motions of groups; dense for one group, else sparse."""
