@@ -14,12 +14,8 @@ from .places import Vector
 
 #: Relative step of differences, where a force does not accept complex numbers.
 STEP = 1e-6
-#: Relative round-off of a potential.
-ROUND_OFF = 1e-14
 #: Relative perturbation of the reference configuration for checks of user-defined elements.
 ASIDE = 0.01
-#: The span of a mean at one time.
-TINY = 1e-300
 COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
@@ -214,8 +210,9 @@ class BoundForce(Bound):
         if before is None or after is None:
             return force
         excess = after - before + np.sum(force * d)
-        if abs(excess) <= ROUND_OFF * (abs(before) + abs(after)):
-            return force  # next to rest round-off, divided by |d|, would be a large force
+        # next to rest round-off of the potential, divided by |d|, would be a large force
+        if abs(excess) <= 1e-14 * (abs(before) + abs(after)):
+            return force
         return force - excess / np.sum(d * d) * d
 
     def stiffness(self, x: Array, v: Array, t: float) -> Any:
@@ -360,7 +357,7 @@ class Remembering:
         if not self.element.evolves or self.element.conserves:
             return 0.0
         dt, after = float(self.span[0]), self.evaluate(y, v, t)[1]
-        mean = self.mean_force(x, y, t - 0.5 * dt, dt or TINY)
+        mean = self.mean_force(x, y, t - 0.5 * dt, dt or 1e-300)  # also of a span of zero
         lost = -np.sum(mean * (y - x)) + (self.potential_at(x, t) or 0.0) - (
             self.potential_at(y, t, after) or 0.0)
         self.values[:] = after
@@ -519,8 +516,6 @@ def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array
 #: a profile may be straight at first, have a bump, or rise only far away.
 ALONG = np.concatenate([s * np.append(np.linspace(0.01, 1.0, 100), (2.0, 4.0, 10.0))
                         for s in (1.0, -1.0)])
-#: Relative difference from a table that is round-off.
-CLOSE = 1e-9
 
 
 def everywhere(sizes: Array) -> Array:
@@ -535,7 +530,7 @@ def is_table(value: Callable[[Array, float], Array], u: Array,
     try:
         with np.errstate(all="ignore"):
             return all(np.all(np.abs(value(s * u, t) - table(s, t))
-                              <= CLOSE * sizes * max(1.0, s * s))
+                              <= 1e-9 * sizes * max(1.0, s * s))  # round-off
                        for k, s in enumerate(ALONG) for t in ((0.0, 0.37)[k % 2],))
     except Exception:  # it may not be defined there
         return False

@@ -29,7 +29,6 @@ from .symbols import Symbol, middle
 SECTION, ROUND_OFF = 6, 1e-12
 
 
-
 def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None = None) -> Array:
     """The part of eps_yy that a section develops freely and its element cannot represent."""
     # A section that bends freely under E0 has a linear eps_xx and S_yy = 0, thus eps_yy = E0_yy -
@@ -75,9 +74,6 @@ def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None =
 
 #: Largest number of products.
 MOST = 8
-
-#: Tolerance of the sum of products, relative to the largest value.
-CLOSE = 1e-9
 
 
 class EigenStrain(Load):
@@ -320,36 +316,24 @@ def _evaluated(name, f, x, y):
 
 def _of_fibres(beam, eigen):
     """The kernel's arguments for a cable, and the linear stresses, a list for each table."""
-    rules, tables = list(beam.across.rules(8)), beam.kernel.tables
-    if len(tables) == 1 and tables[0].law.kind != HISTORY:
-        found = [_resultants(beam, eigen, rules)]
-        return found, found
-    given, stresses = [], []
-    for t, layer in zip(tables, beam.across.layers):
-        stresses.append(_resultants(beam, eigen, [one for one in rules if one[0] is layer]))
-        given.append(stresses[-1])
-        if t.law.kind == HISTORY:
-            X = fibre_points(layer, beam.kernel.points)[1]
-            E0 = eigen.of_layer(layer, *beam.across.coordinates(X))[0]
-            given[-1] = (E0 + np.zeros((beam.mesh.nelements, 1))).T[None]
-    return given, stresses
-
-
-def _resultants(beam, eigen, rules):
-    """Weighted normal forces and moments of a cable's eigenstrain, (ne, 2 points)."""
-    xi = beam.kernel.points
-    out = np.zeros((2, beam.mesh.nelements, len(xi)))
-    across = beam.across
-    for layer, (eta, w) in rules:
+    tables, across, xi = beam.kernel.tables, beam.across, beam.kernel.points
+    together = len(tables) == 1 and tables[0].law.kind != HISTORY  # one table has all layers
+    # normal forces and moments of each table, (2, ne, points)
+    both = np.zeros((len(tables), 2, beam.mesh.nelements, len(xi)))
+    given: list[Any] = [None] * len(tables)
+    for number, (layer, (eta, w)) in enumerate(across.rules(8)):
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
         x, y = across.coordinates(X)
         size = (layer.material.axial_modulus * across.breadth(layer, X, times="grade")
                 * beam.mesh.mapping().height(X[0])[0] * np.tile(w, len(xi)))
-        S0 = size * eigen.of_layer(layer, x, y)[0]
-        for k, moment in enumerate((S0, -S0 * y)):
-            out[k] += moment.reshape(*out[k].shape, -1).sum(axis=-1)
-    out *= beam.kernel.weights
-    return np.concatenate(out, axis=1)
+        S0, k = size * eigen.of_layer(layer, x, y)[0], 0 if together else number
+        for out, moment in zip(both[k], (S0, -S0 * y)):
+            out += moment.reshape(*out.shape, -1).sum(axis=-1)
+        if tables[k].law.kind == HISTORY:
+            E0 = eigen.of_layer(layer, *across.coordinates(fibre_points(layer, xi)[1]))[0]
+            given[k] = (E0 + np.zeros((beam.mesh.nelements, 1))).T[None]
+    stresses = [np.concatenate(one * beam.kernel.weights, axis=1) for one in both]
+    return [s if E0 is None else E0 for s, E0 in zip(stresses, given)], stresses
 
 
 # functions of time too
@@ -368,7 +352,7 @@ def products(name: str, function: Callable[..., Any], beam: Beam, amplitude: Tim
     at = [partial(_at_time, function, float(t)) for t in times]
     F = np.array([_evaluated(f"{name}(t={t:g})", f, x, y) for t, f in zip(times, at)])
     size, left, chosen, places = np.max(np.abs(F)), F.copy(), [], []
-    while np.max(np.abs(left)) > CLOSE * size:
+    while np.max(np.abs(left)) > 1e-9 * size:
         k, p = np.unravel_index(np.argmax(np.abs(left)), left.shape)
         chosen.append(k)
         places.append(p)

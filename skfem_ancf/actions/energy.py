@@ -216,11 +216,6 @@ def by_loops(psi: Any, gradient: Any, hessian: Any,
 #: Where an energy acts beside places of the boundary.
 EVERYWHERE = "cells", "axis"
 _LOWER = np.tril_indices(6)
-#: Relative round-off of energies.
-_ROUND_OFF = 1e-15
-#: Tolerance of invariance under rigid motions, relative to the largest density.
-_INVARIANT = 1e-9
-
 
 
 class Energy(Density):
@@ -337,7 +332,7 @@ class Energy(Density):
                 "ij,jk...->ik...", Q, y[2:].reshape(2, 2, *y.shape[1:])).reshape(y[2:].shape)])
             psi, *others = (bound._density(x, part) for x in (y, moved, turned))
             for what, other in zip(("moved", "turned"), others):
-                refuse(np.max(np.abs(other - psi)) > _INVARIANT * np.max(np.abs(psi)),
+                refuse(np.max(np.abs(other - psi)) > 1e-9 * np.max(np.abs(psi)),
                        "psi of {!r} changes where the body is {} as a whole: it is not a strain "
                        "energy, which depends on F^T F. Leave out check=True for external actions, "
                        "as a foundation or a field", bound, what)
@@ -428,7 +423,7 @@ class Energy(Density):
         for part in self._parts:
             a, b = (self._density(self._variables(u, part), part) for u in (u0, u1))
             gain += float(np.sum(part.weights * (b - a)))
-            noise += _ROUND_OFF * float(np.sum(part.weights * (np.abs(a) + np.abs(b))))
+            noise += 1e-15 * float(np.sum(part.weights * (np.abs(a) + np.abs(b))))
         return gain, noise
 
     def mean_force(self, u0: Array, u1: Array) -> Array:

@@ -19,10 +19,6 @@ from .loads import DeadLoad
 logger = logging.getLogger(__name__)
 #: Steps of differences, relative to the size of a variable.
 STEP = 1e-6
-#: A derivative is symmetric up to this relative error of differences; a time to find out at.
-SYMMETRIC, OTHER = 1e-6, 0.7310585786
-#: Gauss points for the work from the reference configuration, and in a time step.
-WORK, MEAN = 6, 3
 
 
 class _Parameters(FormExtraParams):
@@ -121,7 +117,7 @@ class FormLoad(Density):
             logger.info("%r has no tangent=: its derivative is found by differences", self)
         else:
             at_generic_displacements(bound._require_tangent, beam.sizes)
-        times = (0.0, OTHER) if "t" in used else (0.0,)
+        times = (0.0, 0.7310585786) if "t" in used else (0.0,)  # and one at which nothing is zero
         return bound._with(symmetric=bound._is_conservative(times))
 
     def _evaluated(self, y):
@@ -182,7 +178,8 @@ class FormLoad(Density):
                 except CallbackError:
                     return False
                 off, size = np.abs(A - A.swapaxes(0, 1)).max(), np.abs(A).max()
-                if not off <= SYMMETRIC * (size + STEP * np.abs(P * sizes).max()):
+                # errors of differences are allowed
+                if not off <= 1e-6 * (size + STEP * np.abs(P * sizes).max()):
                     return False
         return True
 
@@ -193,13 +190,13 @@ class FormLoad(Density):
         rest = self._variables(np.zeros(self.beam.N), part)
         d = self._variables(u, part) - rest
         return float(sum(w * np.sum(part.weights * self._slope(rest + s * d, part) * d)
-                         for s, w in zip(*gauss(WORK))))
+                         for s, w in zip(*gauss(6))))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """Mean of the force on a straight path: of exact work for polynomials of degree 5."""
         if not self.symmetric:
             return super().mean_force(u0, u1)
-        return sum((w * self.force(u0 + s * (u1 - u0)) for s, w in zip(*gauss(MEAN))),
+        return sum((w * self.force(u0 + s * (u1 - u0)) for s, w in zip(*gauss(3))),
                    np.zeros(self.beam.N))
 
     def _require_tangent(self, u, d):

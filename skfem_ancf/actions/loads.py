@@ -22,10 +22,6 @@ from .item import Item, on_each, takes
 from .places import Vector, at_node, dense_entries, members_at, section
 from .symbols import (ARROWS, Symbol, arrows_along, faces_of, force_symbol, inside, values_at)
 
-#: Warn of a traction on a cable if its neglected moment exceeds these parts of force times length,
-#: and of force times height (round-off).
-LEVER, ROUND_OFF = 0.01, 1e-12
-
 
 class Amplitude:
     """A user-defined function of time with checks of its values."""
@@ -354,7 +350,7 @@ class Traction(Load):
                 kept += length * np.sum(np.abs(across))
                 size += beam.mesh.height * np.sum(np.hypot(along, across))
             left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
-            if left_out > LEVER * kept + ROUND_OFF * size:
+            if left_out > 0.01 * kept + 1e-12 * size:  # that is round-off
                 warn(f"a traction on {beam!r} acts on its axis: it leaves out a moment of "
                      f"{left_out:.3g} by the distance of the face. Use an element with sections, "
                      "as ElementBeamANCF(2), or give an end its moment by scene.moment",
@@ -565,8 +561,6 @@ class EndMoment(Load):
 
 # loads that depend on time
 
-_NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
-
 
 class TimedLoad(Load):
     """A force that depends on time and not on the displacement. A subclass defines :meth:`places`
@@ -604,7 +598,8 @@ class TimedLoad(Load):
         return self.force(u1)
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        return _NONE
+        none = np.zeros(0, dtype=int)
+        return none, none, np.zeros(0)
 
     def potential(self, u: Array) -> float:
         return -float(self.force(u) @ u)

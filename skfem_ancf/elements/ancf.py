@@ -20,9 +20,6 @@ def _chebyshev(n: int) -> Array:
     return np.concatenate([[-1.0], np.sin(np.arange(1 - m, m, 2) * np.pi / (2 * m)), [1.0]])
 
 
-#: Largest degree of a section.
-MAX_ORDER = 64
-
 POINT_FAMILIES = {
     "chebyshev": _chebyshev,
     "gauss-lobatto": gauss_lobatto,
@@ -60,7 +57,7 @@ class ElementBeamANCF(ElementBeam):
     """
 
     def __init__(self, order: int, points: str = "chebyshev") -> None:
-        n = require_integer("the order of an ANCF beam element", order, 1, MAX_ORDER,
+        n = require_integer("the order of an ANCF beam element", order, 1, 64,
                             "polynomials of a higher degree have no digits left")
         require_option("family of section points", points, POINT_FAMILIES)
         x = np.zeros(1) if n == 1 else (

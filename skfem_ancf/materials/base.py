@@ -14,8 +14,6 @@ from .library import values_of
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-PLANES = ("stress", "strain")
-
 
 class Material(Immutable):
     """An isotropic hyperelastic material in plane stress or plane strain.
@@ -60,7 +58,8 @@ class Material(Immutable):
         compared, or a pair for the principal stresses in tension and compression (force per area).
     """
 
-    _title = ""
+    #: The name of :meth:`named`, and that its values are typical; else "".
+    title = ""
 
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
@@ -68,7 +67,7 @@ class Material(Immutable):
         self.E = _number_or_function("E", E)
         self.nu = require_finite_scalar("nu", nu)
         self.density = None if density is None else _number_or_function("density", density)
-        self.plane = require_option("plane", plane, PLANES)
+        self.plane = require_option("plane", plane, ("stress", "strain"))
         refuse(not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")), "nu must lie "
                "in (-1, 0.5), or be 0.5 in plane stress, got {!r} in plane {}", nu, plane)
         self.shear_correction = (
@@ -116,13 +115,8 @@ class Material(Immutable):
         """
         values, title = values_of(name, units)
         made = cls(**{**values, **changes})
-        made._title = title if not changes.keys() & values.keys() else ""
+        vars(made)["title"] = title if not changes.keys() & values.keys() else ""
         return made
-
-    @property
-    def title(self) -> str:
-        """The name of :meth:`named`, and that its values are typical; else ""."""
-        return self._title
 
     @property
     def graded(self) -> bool:
@@ -313,7 +307,6 @@ class ShearCorrected:
     def moduli(self, strain: Array) -> Array:
         D = self.base.moduli(self._scaled(strain))
         return D * np.outer(self.scale, self.scale).reshape((3, 3) + (1,) * (D.ndim - 2))
-
 
 
 class OverriddenLaw:

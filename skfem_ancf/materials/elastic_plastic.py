@@ -50,7 +50,6 @@ class Voce(Immutable):
         return "Voce({:g}, {:g}, {:g})".format(*self)
 
 
-
 def _by_plane(k):
     return property(lambda self: FUNCTIONS[self.plane][k])
 

@@ -26,10 +26,6 @@ FIBRE = "fibre", "fibre_stored", "axial", "axial_energy"
 NO_VARIABLES: Mapping[str, int] = {}
 
 
-def real(x: Any) -> Array:
-    return np.asarray(x, dtype=float)
-
-
 class AtRest(LinearLaw):
     """The moduli of a material with a history at zero strain, for what knows no history.
     ``material`` is the material, ``scale`` (3,) the factors of strain and stress for shear."""
@@ -178,14 +174,14 @@ class HistoryMaterial(Material):
     def evaluate(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
         """Stress, moduli and history; to be overridden where they are found together."""
         if self.point is not None:
-            S, D, after = self._at_points(self.point, real(strain), real(history), dt)
+            S, D, after = self._at_points(self.point, strain, history, dt)
             return S, D[list(MODULI)].reshape(3, *S.shape), after
         S, after = self.stress(strain, history, dt)
         return S, self.moduli(strain, history, dt), after
 
     def _at_points(self, function, strain, history, dt):
         """Stress, moduli and history of a function of a point, in NumPy."""
-        n = len(strain)
+        strain, history, n = np.asarray(strain, float), np.asarray(history, float), len(strain)
         S, D = np.empty(strain.shape), np.empty((n * (n + 1) // 2, *strain.shape[1:]))
         after = np.empty((self.number, *strain.shape[1:]))
         python(function)(self.constants, strain, history, dt, S, D, after)
@@ -215,7 +211,7 @@ class HistoryMaterial(Material):
         (...) is that along the fibre. By default the lateral strain is found by Newton's method;
         ConvergenceError if it is not found, upon which solvers cut their step."""
         if self.fibre is not None:
-            S, D, after = self._at_points(self.fibre, real(strain)[None], real(history), dt)
+            S, D, after = self._at_points(self.fibre, np.asarray(strain)[None], history, dt)
             return S[0], D[0], after
         E = np.zeros((3, *np.shape(strain)))
         E[0], E[1] = strain, -self.lateral_ratio * strain

@@ -31,7 +31,6 @@ def relax(c, history, dt, S, after):
     return part
 
 
-
 @source
 def square(D, x, y, z):
     """The square of a vector by a symmetric matrix D (6,)."""

@@ -20,8 +20,6 @@ E, NU, KINEMATIC, YIELD, SATURATION, RATE, LINEAR, ROWS = range(8)
 #: Newton corrections of a return to the yield surface; the gap at the end over the yield stress, or
 #: over the trial stress, whose round-off it has.
 CORRECTIONS, FEW, CLOSED, ROUGH = 100, 10, 1e-13, 1e-14
-#: Relative excess of the yield stress that is round-off.
-EXCESS = 1e-12
 #: f of the yield stress 1.
 ROOT = np.sqrt(2.0 / 3.0)
 HALF = np.sqrt(0.5)
@@ -57,7 +55,7 @@ def locked(c, history):
 @source
 def yields(c, square, p):
     """True where the square of f is beyond the yield stress."""
-    y = ROOT * (1.0 + EXCESS) * hardened(c, p)[0]
+    y = ROOT * (1.0 + 1e-12) * hardened(c, p)[0]  # what is beyond by less is round-off
     return square > y * y
 
 

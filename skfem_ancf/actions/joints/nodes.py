@@ -54,7 +54,6 @@ class Settlements:
 EQUATIONS = "force along x", "force along y", "moment"
 
 
-
 class Nodes(Joint):
     """Ends that meet at a node share its position; rigid ends share its rotation, too.
 

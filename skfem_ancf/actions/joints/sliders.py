@@ -91,14 +91,6 @@ def _slider(at: Vector, normal: Array) -> Symbol:
 
 # the axis of a beam as a curve, and the closest point on it
 
-#: Least number of sample points of an element for the initial search.
-
-
-SAMPLES = 5
-#: Largest number of iterations for the closest point.
-ITERATIONS = 40
-
-
 class Axis:
     """The axis of a beam, a polynomial of s in each element; ``first`` is the beam's first DOF."""
 
@@ -117,7 +109,7 @@ class Axis:
         for k in range(1, 4):
             self._powers[k, :, :-1] = self._powers[k - 1, :, 1:] * np.arange(1, degree + 1)
         self._start = np.asarray(beam.q0)
-        x = np.linspace(0.0, 1.0, max(SAMPLES, degree))
+        x = np.linspace(0.0, 1.0, max(5, degree))  # where the search for the closest point begins
         self._samples = self._powers[0] @ (x - 0.5) ** np.arange(degree + 1)[:, None]
         starts = (beam.mesh.t[0] * beam.nd)[:, None, None]
         self._dofs = first + starts + 2 * used + np.arange(2)[:, None]  # (ne, 2, nb)
@@ -162,7 +154,7 @@ class Axis:
         gap = np.sum((x - p[:, None]) ** 2, axis=1)
         e, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
         s, n = float(e + k / (gap.shape[1] - 1)), self.beam.mesh.nelements
-        for _ in range(ITERATIONS):
+        for _ in range(40):
             c, d, dd, _ = self.at(u, s)
             gap, size = c - p, float(d @ d)
             slope = size + float(gap @ dd)
@@ -183,10 +175,6 @@ class Axis:
 
 
 # discrete gradients of the equations of a sleeve between two displacements
-
-#: Least ``advance``, in elements, by which is divided.
-TINY = 1e-9
-
 
 def _mean(pair: Any) -> Array:
     return 0.5 * (pair[0] + pair[1])
@@ -266,7 +254,7 @@ class Span(NamedTuple):
                                            - (share @ passing) * place.mixed())
             out += 0.5 * multiplier * row
             work += 0.5 * multiplier * float(D @ (v1 - v0) - row @ self.change)
-        if abs(self.advance) > TINY:
+        if abs(self.advance) > 1e-9:  # else there is nothing to divide by
             out += work / float(place.row @ self.change) * place.row
         return out
 

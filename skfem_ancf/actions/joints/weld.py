@@ -52,12 +52,6 @@ class Hinge(ComposedJoint):
 
 # bond between a boundary of a domain and another member (mortar method)
 
-#: Round-off relative to the largest entry of an equation.
-
-
-ROUND_OFF = 1e-14
-
-
 class Glue(Joint):
     """The boundary of a domain bonded to the surface of another member: the mortar method.
 
@@ -109,7 +103,7 @@ class Glue(Joint):
                               at.ravel(), -(value[used] * w).ravel()))
         i, j, v = map(np.concatenate, zip(*found))
         A = sparse.coo_array((v / size[i], (i, j)), shape=(len(tests), layout.N)).tocsr().tocoo()
-        keep = np.abs(A.data) > ROUND_OFF
+        keep = np.abs(A.data) > 1e-14  # else round-off
         self.found = A.row[keep], A.col[keep], A.data[keep]
         self.equations = tuple(f"force along {'xy'[c]}" for c in tests % 2)
 
@@ -220,10 +214,6 @@ def symbol_of(joint: Any, layout: Layout, text: str, fixed: str,
     if any(map(is_ground, joint.beams)):
         return (support_of(layout, beam, place(layout, beam, at), fixed),)
     return (Symbol("joint", (place(layout, beam, at),), text=text),)
-
-
-#: Largest number of intervals of an integral over time.
-PIECES = 500
 
 
 class PrescribedPosition(ComposedJoint):
@@ -364,7 +354,7 @@ class Turned:
             return self.speed * t
         return float(scipy.integrate.quad(
             lambda s: ask_number("speed(t={:g})", self.speed, s), 0.0, t,
-            epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
+            epsabs=1e-13, epsrel=1e-13, limit=500)[0])
 
 
 class PrescribedTurn(ComposedJoint):
