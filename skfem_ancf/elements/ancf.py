@@ -11,7 +11,7 @@ from ..core import (Array, gauss_lobatto, hermite_basis, is_builtin, read_only, 
                     require_integer, require_like, require_names, require_option, require_positive)
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.mapping import SECTIONS
-from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, StabilisedMode, require_degree
+from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, require_degree
 
 
 def _chebyshev(n: int) -> Array:
@@ -208,6 +208,9 @@ class ElementBeamCable(ElementBeam):
     order = 0
     kinematics = "cable"
     carries_shear_parabola = False
+    #: The mode that a higher degree misses in one element is resisted where two meet, and that of
+    #: the cubic axis by a third point.
+    stabilised = ()
 
     def __init__(self, degree: int = 3) -> None:
         m = (require_degree(degree) + 1) // 2
@@ -245,12 +248,6 @@ class ElementBeamCable(ElementBeam):
     @cached_property
     def sampling(self) -> Sampling:
         return Sampling(self.axis_degree - 1, {})
-
-    @property
-    def stabilised(self) -> tuple[StabilisedMode, ...]:
-        # the mode that a higher degree misses in one element is resisted where two meet, and that
-        # of the cubic axis by a third point
-        return ()
 
 
 #: Least order for a field of the section; 0 is the cable.

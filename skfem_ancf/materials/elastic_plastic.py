@@ -50,8 +50,12 @@ class Voce(Immutable):
         return "Voce({:g}, {:g}, {:g})".format(*self)
 
 
-def _by_plane(k):
-    return property(lambda self: FUNCTIONS[self.plane][k])
+def _by_plane(k: int) -> Any:
+    def function(self: Any) -> Any:
+        """One of :data:`FUNCTIONS`."""
+        return FUNCTIONS[self.plane][k]
+
+    return property(function)
 
 
 class ElasticPlastic(HistoryMaterial):
