@@ -26,7 +26,6 @@ class Settlements:
 
     def __init__(self, numbers: Array, of: dict[tuple[int, int], Any] | None = None) -> None:
         self.numbers, self.of = numbers, of or {}
-        self.functions = tuple(self.of.values())
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> "Settlements":
         """A copy with nodes displaced by a number or a function of time."""
@@ -75,8 +74,6 @@ class Nodes(Joint):
                  ) -> None:
         self.nodes, self.hinged, self.fixed = nodes, hinged, fixed
         self.settlements = Settlements(np.zeros(fixed.shape))
-        #: functions of time of these
-        self.functions = self.settlements.functions
         self.graph, self.lines = graph, lines
         # rigid ends come before hinged ones: the first of each node is its leader
         order = np.lexsort((np.arange(len(nodes)), hinged, nodes))
