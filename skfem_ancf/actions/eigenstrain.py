@@ -137,7 +137,7 @@ class EigenStrain(Load):
         for name, f in timed.items():
             for g, c in products(self.given[name], f, beam, self.amplitude):
                 only = {**dict.fromkeys(given), name: g}
-                out.append(self._with(beam=k, amplitude=Amplitude(c), **only))
+                out.append(self._with(beam=k, amplitude=Amplitude(c), at_rest=c(1.0), **only))
         if not timed or any(f is not None for name, f in given.items() if name not in timed):
             out.append(self._with(beam=k, **dict.fromkeys(timed)))
         return out
@@ -148,9 +148,7 @@ class EigenStrain(Load):
         bound = cast("EigenStrain", super().bind(beam))
         # elements that remember have the strain minus the eigenstrain
         bound._distribution = Distribution() if remembers(beam) else Distribution(eigen=bound)
-        function, kernel = getattr(self.amplitude, "function", None), beam.kernel
-        if isinstance(function, Coefficient):
-            bound.at_rest = function(1.0)
+        kernel = beam.kernel
         if not beam.has_sections:
             bound.eigen_stresses, bound._stresses = _of_fibres(beam, self)
             return bound
@@ -340,7 +338,7 @@ def _of_fibres(beam, eigen):
 
 
 def products(name: str, function: Callable[..., Any], beam: Beam, amplitude: TimeFunction
-             ) -> "list[tuple[Callable[..., Any], Coefficient]]":
+             ) -> list[tuple[Callable[..., Any], Callable[..., Any]]]:
     """A function (x, y, t) as a sum of products of functions of (x, y) and of t, exact where such a
     sum exists: by empirical interpolation at some times and as many places (Barrault, Maday,
     Nguyen, Patera: "An empirical interpolation method", Comptes Rendus Mathematique 339 (2004)).
@@ -361,26 +359,17 @@ def products(name: str, function: Callable[..., Any], beam: Beam, amplitude: Tim
                "an amplitude each", name, MOST)
         left = F - np.linalg.solve(F[np.ix_(chosen, places)].T, F[:, places].T).T @ F[chosen]
     inverse = np.linalg.inv(F[np.ix_(chosen, places)])
-    return [(at[k], Coefficient(name, function, x[places], y[places], inverse[:, j], amplitude))
-            for j, k in enumerate(chosen)]
+    return [(at[k], partial(_factor, name, function, x[places], y[places], inverse[:, j],
+                            amplitude)) for j, k in enumerate(chosen)]
 
 
 def _at_time(function, t, x, y):
     return function(x, y, t)
 
 
-class Coefficient:
+def _factor(name, function, x, y, weights, amplitude, t):
     """The time factor of one product: weighted values of the function at some places."""
-
-    def __init__(self, name: str, function: Callable[..., Any], x: Array, y: Array,
-                 weights: Array, amplitude: TimeFunction) -> None:
-        self.name, self.function, self.x, self.y, self.weights = name, function, x, y, weights
-        self.amplitude = amplitude
-
-
-    def __call__(self, t):
-        if np.ndim(t):
-            return np.array([self(s) for s in t])
-        at = partial(_at_time, self.function, float(t))
-        found = _evaluated(f"{self.name}(t={t:g})", at, self.x, self.y)
-        return float(found @ self.weights) * (1.0 if self.amplitude is None else self.amplitude(t))
+    if np.ndim(t):
+        return np.array([_factor(name, function, x, y, weights, amplitude, s) for s in t])
+    found = _evaluated(f"{name}(t={t:g})", partial(_at_time, function, float(t)), x, y)
+    return float(found @ weights) * (1.0 if amplitude is None else amplitude(t))
