@@ -242,13 +242,7 @@ class Material(Immutable):
 
     def moduli(self, strain: Array) -> Array:
         """Derivative of the stress with respect to ``strain``, shape (3, 3, ...)."""
-        strain = np.asarray(strain)
-        out = []
-        for j in range(3):
-            step = np.zeros((3,) + (1,) * (strain.ndim - 1), dtype=complex)
-            step[j] = 1e-30j
-            out.append(np.imag(self.stress(strain + step)) / 1e-30)
-        return np.stack(out, 1)
+        return stress_rates(self.stress, strain)
 
     def thickness_stretch(self, strain: Array) -> Array:
         """Stretch out of the plane, shape (...): 1 in plane strain. Needed for Cauchy stress."""
@@ -276,6 +270,16 @@ def _number_or_function(name, value):
     """Check a positive number, or a function of material coordinates."""
     return value if callable(value) and not isinstance(value, type) else require_positive(
         name, value)
+
+
+def stress_rates(stress: Callable[[Array], Array], strain: Array) -> Array:
+    """Derivative (3, 3, ...) of a stress (3, ...) by the strain (3, ...), by complex steps."""
+    strain, out = np.asarray(strain), []
+    for j in range(3):
+        step = np.zeros((3,) + (1,) * (strain.ndim - 1), dtype=complex)
+        step[j] = 1e-30j
+        out.append(np.imag(stress(strain + step)) / 1e-30)
+    return np.stack(out, 1)
 
 
 def hooke(E: float, nu: float, plane: str) -> Array:

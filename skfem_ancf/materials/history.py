@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import (Array, ConvergenceError, InputError, Law, ask, rebuilt, refuse, require_integer,
                     require_positive, require_slope)
-from .base import LinearLaw, Material, hooke
+from .base import LinearLaw, Material, hooke, stress_rates
 from .pointwise import MODULI, python
 
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle
@@ -16,8 +16,8 @@ ACROSS = 14
 #: Newton corrections of the lateral strain of a fibre; lateral stress over the largest that is
 #: left, and that which may be if it does not decrease.
 LATERAL, CLOSE, ROUGH = 50, 1e-13, 1e-8
-#: Step of derivatives, strain and time at which those of a user-defined law are tested.
-TINY, SMALL, SPAN = 1e-30, 1e-3, 1.0
+#: Strain and time at which derivatives of a user-defined law are tested.
+SMALL, SPAN = 1e-3, 1.0
 
 
 #: Names of the functions of a point and of a fibre, and of the methods that they stand for.
@@ -164,12 +164,7 @@ class HistoryMaterial(Material):
         Iterations take it as symmetric."""
         if self.point is not None:
             return self.evaluate(strain, history, dt)[1]
-        out = []
-        for j in range(3):
-            step = np.zeros((3,) + (1,) * (np.ndim(strain) - 1), dtype=complex)
-            step[j] = 1j * TINY
-            out.append(np.imag(self.stress(strain + step, history, dt)[0]) / TINY)
-        return np.stack(out, 1)
+        return stress_rates(lambda E: self.stress(E, history, dt)[0], strain)
 
     def evaluate(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
         """Stress, moduli and history; to be overridden where they are found together."""
