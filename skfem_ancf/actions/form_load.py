@@ -9,7 +9,7 @@ from skfem.assembly import BilinearForm, FacetBasis, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from ..beam import AXIS, BODY, Distribution, Domain, Sampled, WhichMember, facets_along
+from ..beam import AXIS, BODY, Distribution, Domain, Sampled, WhichMember, station_of_node
 from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss, refuse,
                     require_finite, require_flag, require_slope, shown, warnings_as_errors)
 from .energy import Density, DensityPoints
@@ -217,10 +217,15 @@ class FormLoad(Density):
         if np.any(P[2:]):
             return None
         if isinstance(basis, FacetBasis):
-            groups, stations = facets_along(self.beam.mesh, basis)
-            per_xi = f * basis.dx / basis.W
-            return Distribution(stations=stations, sampled=tuple(
-                Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
+            mesh, facets, sampled = self.beam.mesh, np.asarray(basis.find), []
+            n, ne, xi = mesh.p.shape[1], mesh.nelements, np.asarray(basis.X[0]).ravel()
+            for side in (0, 1):  # bottom and top; others are ends
+                on, = np.nonzero((facets >= n + side * ne) & (facets < n + (side + 1) * ne))
+                if len(on):
+                    sampled.append(Sampled(side, facets[on] - n - side * ne, xi,
+                                           (f * basis.dx / basis.W)[:, on]))
+            return Distribution(sampled=tuple(sampled), stations=tuple(
+                station_of_node(mesh, int(k)) for k in facets[facets < n]))
         xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
         if not self.beam.has_sections:
             return Distribution(sampled=(

@@ -8,8 +8,8 @@ from .rigid import RigidBody, on_body
 from .kinematics import (bent, direction, direction_weights, element_dofs, entries_of, locate,
                          plane, probe_reference)
 from .distribution import (AXIS, BODY, LEFT, RIGHT, SNAP, UPPER, Distribution, Facets, Sampled,
-                           add_nodal, divided, facets_along, groups_of, on_facets, on_points,
-                           station_of_node, stations_of_vector, surfaces_of)
+                           add_nodal, divided, groups_of, on_facets, on_points, station_of_node,
+                           stations_of_vector, surfaces_of)
 from .layout import (BeamPoints, Layout, Located, PointLocator, WhichBeam, WhichMember,
                      require_body, select_beam, select_member)
 from .strains import by_history, cable_forces, has_history, remembers, with_history
