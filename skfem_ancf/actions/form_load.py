@@ -117,8 +117,21 @@ class FormLoad(Density):
             logger.info("%r has no tangent=: its derivative is found by differences", self)
         else:
             at_generic_displacements(bound._require_tangent, beam.sizes)
-        times = (0.0, 0.7310585786) if "t" in used else (0.0,)  # and one at which nothing is zero
-        return bound._with(symmetric=bound._is_conservative(times))
+        # It is conservative if its derivative is symmetric, but for errors of differences, at some
+        # displacements and times, one at which nothing is zero.
+        sizes = np.array([beam.size] * 2 + [1.0] * 4)[:, None, None]
+        times = (0.0, 0.7310585786) if "t" in used else (0.0,)
+        for t, scale in [(t, scale) for t in times for scale in (0.0, 1e-2)]:
+            y = bound._variables(scale * beam.sizes * np.cos(np.arange(beam.N)), part)
+            try:
+                now = bound._with(_time=t)
+                A, P = now._curvature(y, part) * sizes * sizes[:, None], now._slope(y, part)
+            except CallbackError:
+                return bound
+            off, size = np.abs(A - A.swapaxes(0, 1)).max(), np.abs(A).max()
+            if not off <= 1e-6 * (size + STEP * np.abs(P * sizes).max()):
+                return bound
+        return bound._with(symmetric=True)
 
     def _evaluated(self, y):
         w = self._fields(y)
@@ -164,24 +177,6 @@ class FormLoad(Density):
         steps = STEP * np.array([self.beam.size] * 2 + [1.0] * 4)
         return np.stack([(self._slope(y + d, part) - self._slope(y - d, part)) / (2.0 * step)
                          for step, d in zip(steps, (steps * np.eye(6))[:, :, None, None])], axis=1)
-
-    def _is_conservative(self, times):
-        """True if the derivative is symmetric at some displacements and times."""
-        part, = self._parts
-        sizes = np.array([self.beam.size] * 2 + [1.0] * 4)[:, None, None]
-        for t in times:
-            for scale in (0.0, 1e-2):
-                y = self._variables(scale * self.beam.sizes * np.cos(np.arange(self.beam.N)), part)
-                try:
-                    now = self._with(_time=t)
-                    A, P = now._curvature(y, part) * sizes * sizes[:, None], now._slope(y, part)
-                except CallbackError:
-                    return False
-                off, size = np.abs(A - A.swapaxes(0, 1)).max(), np.abs(A).max()
-                # errors of differences are allowed
-                if not off <= 1e-6 * (size + STEP * np.abs(P * sizes).max()):
-                    return False
-        return True
 
     def potential(self, u: Array) -> float | None:
         if not self.symmetric:
