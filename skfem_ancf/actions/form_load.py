@@ -10,8 +10,8 @@ from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
 from ..beam import AXIS, BODY, Distribution, Domain, Sampled, WhichMember, station_of_node
-from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss, refuse,
-                    require_finite, require_flag, require_slope, shown, warnings_as_errors)
+from ..core import (Array, CallbackError, Place, TimeFunction, explained, gauss, refuse,
+                    require_finite, require_flag, require_slope, warnings_as_errors)
 from .energy import Density, DensityPoints
 from .bound import COMPLEX, at_generic_displacements
 from .loads import DeadLoad
@@ -85,9 +85,8 @@ class FormLoad(Density):
                  amplitude: TimeFunction = None, tangent: BilinearForm | None = None,
                  scaled: bool = True) -> None:
         super().__init__(beam, amplitude)
-        if not isinstance(form, LinearForm):
-            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
-                             "form is a subclass of skfem_ancf.actions.loads.Load, for scene.add")
+        refuse(not isinstance(form, LinearForm), "a load is a scikit-fem LinearForm, got {!r}; "
+               "what is no form is a subclass of skfem_ancf.actions.loads.Load, for scene.add", form)
         refuse(isinstance(boundary, BilinearForm), "the second argument of a load is the boundary, "
                "got {!r}: give the derivative as tangent=", boundary)
         refuse(tangent is not None and not isinstance(tangent, BilinearForm), "tangent must be a "

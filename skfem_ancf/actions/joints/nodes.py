@@ -26,6 +26,9 @@ class Settlements:
 
     def __init__(self, numbers: Array, of: dict[tuple[int, int], Any] | None = None) -> None:
         self.numbers, self.of = numbers, of or {}
+        #: whether nodes move along x and y and rotate
+        self.moves = [bool(np.any(numbers[:, k])) or any(at == k for _, at in self.of)
+                      for k in range(len(COMPONENTS))]
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> "Settlements":
         """A copy with nodes displaced by a number or a function of time."""
@@ -36,9 +39,6 @@ class Settlements:
             if callable(by):
                 of[node, k] = by
         return Settlements(numbers, of)
-
-    def moves(self, k: int) -> bool:
-        return bool(np.any(self.numbers[:, k])) or any(at == k for _, at in self.of)
 
     def by(self, nodes: Array, k: int, times: Array) -> Array:
         """Displacements of nodes at some times, shape (n, m)."""
@@ -89,11 +89,11 @@ class Nodes(Joint):
 
     @property
     def moving(self) -> bool:  # type: ignore[override]
-        return any(self.settlements.moves(k) for k in range(len(COMPONENTS)))
+        return any(self.settlements.moves)
 
     @property
     def turning(self) -> bool:
-        return self.settlements.moves(COMPONENTS.index("angle"))
+        return self.settlements.moves[2]
 
     def _shifts(self, times: Array) -> list[Array]:
         return [self.settlements.by(self.nodes[at], k, times)

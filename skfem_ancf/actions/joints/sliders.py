@@ -9,7 +9,7 @@ import numpy as np
 from ...beam import Beam, Layout, RigidBody, WhichBeam, WhichMember, select_beam
 from ...core import (Array, ArrayLike, InputError, array_cache, hermite_basis, refuse,
                      require_direction, require_finite, require_flag, require_label,
-                     require_positive, shown)
+                     require_positive)
 from ...mesh.mapping import cross, turned
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol, tangent_at
@@ -507,8 +507,7 @@ def slider(layout: Layout, at: Any, on: WhichMember, direction: ArrayLike | None
     """A :class:`Sleeve` on a beam, or a :class:`Slot` of a rigid body or the ground."""
     at = tuple(named_place(layout, at))
     if is_ground(on) or isinstance(layout.beam(on), RigidBody):
-        if direction is None:
-            raise InputError(f"a slider on {shown(on)} needs the direction of its line")
-        return Slot(at, on, direction, angle=angle, name=name)
+        refuse(direction is None, "a slider on {!r} needs the direction of its line", on)
+        return Slot(at, on, direction, angle=angle, name=name)  # type: ignore[arg-type]
     refuse(direction is not None, "a slider on a beam moves along its axis: give no direction")
     return Sleeve(at, on, angle, name)  # type: ignore[arg-type]
