@@ -86,7 +86,8 @@ class FormLoad(Density):
                  scaled: bool = True) -> None:
         super().__init__(beam, amplitude)
         refuse(not isinstance(form, LinearForm), "a load is a scikit-fem LinearForm, got {!r}; "
-               "what is no form is a subclass of skfem_ancf.actions.loads.Load, for scene.add", form)
+               "what is no form is a subclass of skfem_ancf.actions.loads.Load, for scene.add",
+               form)
         refuse(isinstance(boundary, BilinearForm), "the second argument of a load is the boundary, "
                "got {!r}: give the derivative as tangent=", boundary)
         refuse(tangent is not None and not isinstance(tangent, BilinearForm), "tangent must be a "
