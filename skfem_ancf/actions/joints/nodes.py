@@ -122,7 +122,7 @@ class Nodes(Joint):
         self.supported = [self.leaders[on] for on in self.fixed[self.nodes[self.leaders]].T]
         self.supported[2] = self.supported[2][~self.hinged[self.supported[2]]]
         ends = (self.followers, self.followers, self.turned, *self.supported)
-        self.equations = tuple(name for name, at in zip(2 * EQUATIONS, ends) for _ in at)
+        self.equations = tuple(np.repeat(2 * EQUATIONS, list(map(len, ends))).tolist())
         positions, directions, weights, start = [], [], [], []
         for k, beam in enumerate(layout.beams):
             at, first = chain_ends(beam).ravel(), layout.offset(k)
