@@ -1,14 +1,13 @@
 """The nodes of a frame: connections between the ends of its lines, and settlements."""
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from ...beam import Beam, Layout, direction
-from ...core import Array, MeshError, sample
+from ...core import Array, MeshError, cached_property, sample
 from ...mesh.frame_graph import FrameGraph
 from ..places import Vector
 from ..symbols import Symbol, support
