@@ -44,13 +44,6 @@ class Vector:
         return self.dofs.ravel(), (np.asarray(direction)[:, None] * self.weights).ravel()
 
 
-def products(a: Vector, b: Vector, K: Array) -> tuple[Array, Array, Array]:
-    """Second derivative by the DOFs of ``a . K b``, K (2, 2)."""
-    # Rows, columns and values (k,), of a by b: the other half has both exchanged.
-    values = np.einsum("ij,ik,jl->ikjl", K, a.weights, b.weights)
-    return dense_entries(a.dofs, b.dofs, values)
-
-
 def dense_entries(rows: Array, columns: Array, values: Array) -> tuple[Array, Array, Array]:
     """Rows, columns and values (k,) of a matrix (2, n, 2, m) of DOFs (2, n) and (2, m)."""
     i = np.broadcast_to(rows[:, :, None, None], values.shape)

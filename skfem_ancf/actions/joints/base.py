@@ -10,7 +10,7 @@ from ...core import Array, ArrayLike, InputError, explained, is_builtin, require
 from ...mesh.places import is_point
 from ..bound import BoundConstraint, require_derivatives, require_entries, user_parts
 from ..item import Item
-from ..places import Vector, products
+from ..places import Vector, dense_entries
 
 
 def rotation(angle: float) -> Array:
@@ -137,9 +137,10 @@ class Equation:
             none = np.zeros(0, dtype=int)
             return none, none, np.zeros(0)
         d, e, M = self.product
+        rows, columns, values = dense_entries(d.dofs, e.dofs, np.einsum(
+            "ij,ik,jl->ikjl", factor * (M + M.T if d is e else M), d.weights, e.weights))
         if d is e:
-            return products(d, d, factor * (M + M.T))
-        rows, columns, values = products(d, e, factor * M)
+            return rows, columns, values
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
 
 
