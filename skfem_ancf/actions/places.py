@@ -7,8 +7,8 @@ import numpy as np
 
 from ..beam import Beam, Domain, Layout, RigidBody, WhichMember
 from ..beam.kinematics import direction as direction_of, direction_weights, locate, probe_reference
-from ..core import Array, ArrayLike, InputError, MeshError, refuse, require_finite, shown
-from ..mesh.places import as_point, is_point, node_of, points_of_rows
+from ..core import Array, ArrayLike, MeshError, refuse, require_finite
+from ..mesh.places import as_point, is_point, node_of
 
 #: Name of the ground, in place of a beam.
 GROUND = "ground"
@@ -209,18 +209,6 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
         place if isinstance(place, str) else tuple(map(float, place)))
 
 
-def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
-    """A value for each of n beams: given once for all, or once for each."""
-    refuse(value is None, "a joint needs {}", what)
-    value = points_of_rows(value)
-    if isinstance(value, (str, np.ndarray)) or callable(value) or is_point(value):  # one place
-        return (value,) * n
-    if isinstance(value, (tuple, list)) and len(value) == n:
-        return tuple(value)
-    raise InputError(f"a joint of {n} beams needs {what}, one for all of them or one for each, as "
-                     f"at=('right', 'left'), got {shown(value)}")
-
-
 def both_of(name: str, place: Any) -> tuple[Any, Any]:
     """A beam or body and a place on it; a RigidBody alone has the place None."""
     if isinstance(place, RigidBody):
@@ -228,14 +216,6 @@ def both_of(name: str, place: Any) -> tuple[Any, Any]:
     refuse(not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place),
            "{} is a beam with a place of it, as (1, 'left'), or a RigidBody, got {!r}", name, place)
     return place[0], place[1]
-
-
-def several(beams: Any) -> tuple[Any, ...]:
-    """Check the beams and bodies of a joint, two at least."""
-    refuse(not isinstance(beams, (tuple, list)) or len(beams) < 2, "beams must be two beams or "
-           "rigid bodies or more, by Beam, RigidBody, name or number, or 'ground', got {!r}", beams)
-    refuse(all(map(is_ground, beams)), "a joint needs a beam or a rigid body, got {!r}", beams)
-    return tuple(beams)
 
 
 def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:

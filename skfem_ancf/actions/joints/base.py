@@ -95,12 +95,6 @@ class Joint(BoundConstraint, Item):
         return f"<{' '.join(part for part in parts if part)}>"
 
 
-def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
-    """Names of the equations between the first of n beams and each of the others."""
-    return tuple(names) if n == 2 else tuple(
-        f"{name}, from number {k}" for k in range(1, n) for name in names)
-
-
 def angle_to(d: ArrayLike, e: ArrayLike) -> float:
     """Angle from a plane vector e to another one d, in (-2 pi, 2 pi)."""
     return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
