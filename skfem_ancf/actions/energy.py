@@ -53,6 +53,9 @@ class Density(Load):
 
     constant = False
     first_order = True
+    # of a subclass
+    _slope: Any
+    _curvature: Any
     # of a bound one
     _parts: Sequence[DensityPoints]
     _time = 0.0
@@ -60,12 +63,6 @@ class Density(Load):
 
     def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         return self.factor(t), self if t is None else self._with(_time=float(t))
-
-    def _slope(self, y, part):
-        raise NotImplementedError
-
-    def _curvature(self, y, part):
-        raise NotImplementedError
 
     def _variables(self, u, part):
         """The six variables at points, shape (6, n, np)."""

@@ -216,9 +216,6 @@ class IndependentPart(Joint):
         keep = rows >= 0
         return (rows[keep], *(x[..., keep] for x in others))
 
-    def _all(self, multipliers: Array) -> Array:
-        return np.bincount(self.kept, multipliers, len(self._number))
-
     def value(self, u: Array, t: float) -> Array:
         return np.asarray(self.joint.value(u, t))[self.kept]
 
@@ -227,14 +224,15 @@ class IndependentPart(Joint):
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
-        return self.joint.curvature(u, t, self._all(multipliers))
+        return self.joint.curvature(u, t, np.bincount(self.kept, multipliers, len(self._number)))
 
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.mean_entries(u0, u1, t))
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
-        return self.joint.mean_turning(u0, u1, v0, v1, t, self._all(multipliers))
+        return self.joint.mean_turning(u0, u1, v0, v1, t, np.bincount(
+            self.kept, multipliers, len(self._number)))
 
     def lost(self, u: Array) -> str:
         return self.joint.lost(u)
