@@ -119,8 +119,8 @@ class EigenStrain(Load):
         super().__init__(beam, amplitude)
         if xx is None and yy is None and xy is None:
             raise InputError("an eigenstrain needs a component: give xx, yy or xy")
-        self.xx, self.yy, self.xy = (_number_or_function(f"eps_{name}", f) for name, f in (
-            ("xx", xx), ("yy", yy), ("xy", xy)))
+        self.xx, self.yy, self.xy = (f if f is None else _number_or_function(f"eps_{name}", f)
+                                     for name, f in (("xx", xx), ("yy", yy), ("xy", xy)))
 
     def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
         """(eps_xx, eps_yy, 2 eps_xy) of a layer at coordinates x, y (...), shape (3, ...)."""
@@ -282,7 +282,7 @@ class Temperature(EigenStrain):
     def __init__(self, change: Any, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         Load.__init__(self, beam, amplitude)
-        self.change = _number_or_function("the temperature", change, False)
+        self.change = _number_or_function("the temperature", change)
 
     def bind(self, beam: Beam) -> Load:
         if not any(layer.material.thermal_expansion for layer in beam.across.layers):
@@ -297,9 +297,7 @@ class Temperature(EigenStrain):
         return np.array([T, T, 0.0 * T])
 
 
-def _number_or_function(name, value, optional=True):
-    if value is None and optional:
-        return None
+def _number_or_function(name, value):
     if callable(value):
         return require_function(name, value, "of (x, y)")
     with retold(InputError, "{} must be a number or a function of (x, y), got {!r}", name, value):
