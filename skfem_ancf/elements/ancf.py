@@ -13,15 +13,11 @@ from ..mesh.mesh_beam import MeshBeam
 from ..mesh.mapping import SECTIONS
 from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, require_degree
 
-
-def _chebyshev(n: int) -> Array:
-    """Both ends of the interval, and the zeros of the Chebyshev polynomial T_{n-2}."""
-    m = n - 2  # sines instead of cosines: exactly antisymmetric
-    return np.concatenate([[-1.0], np.sin(np.arange(1 - m, m, 2) * np.pi / (2 * m)), [1.0]])
-
-
 POINT_FAMILIES = {
-    "chebyshev": _chebyshev,
+    # both ends of the interval, and the zeros of the Chebyshev polynomial T_{n-2}; sines instead of
+    # cosines: exactly antisymmetric
+    "chebyshev": lambda n: np.concatenate([
+        [-1.0], np.sin(np.arange(3 - n, n - 2, 2) * np.pi / (2 * (n - 2))), [1.0]]),
     "gauss-lobatto": gauss_lobatto,
     "equispaced": lambda n: np.linspace(-1.0, 1.0, n),
 }
