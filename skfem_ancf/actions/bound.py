@@ -14,13 +14,9 @@ from .places import Vector
 
 #: Relative step of differences, where a force does not accept complex numbers.
 STEP = 1e-6
-#: Relative round-off of a potential.
-ROUND_OFF = 1e-14
 #: Relative perturbation of the reference configuration for checks of user-defined elements.
 ASIDE = 0.01
-#: The span of a mean at one time.
-TINY = 1e-300
-_COMPLEX = getattr(np, "exceptions", np).ComplexWarning
+COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
 class Bound:
@@ -214,8 +210,9 @@ class BoundForce(Bound):
         if before is None or after is None:
             return force
         excess = after - before + np.sum(force * d)
-        if abs(excess) <= ROUND_OFF * (abs(before) + abs(after)):
-            return force  # next to rest round-off, divided by |d|, would be a large force
+        # next to rest round-off of the potential, divided by |d|, would be a large force
+        if abs(excess) <= 1e-14 * (abs(before) + abs(after)):
+            return force
         return force - excess / np.sum(d * d) * d
 
     def stiffness(self, x: Array, v: Array, t: float) -> Any:
@@ -278,11 +275,11 @@ def derivative(function: Callable[[Array], Any], x: Array) -> Array:
         step, rough = np.zeros(x.shape, dtype=complex), out[column]
         step[k] = 1e-30j
         try:
-            with warnings_as_errors(_COMPLEX):
+            with warnings_as_errors(COMPLEX):
                 found = np.imag(function(x + step)) / 1e-30
             if np.allclose(found, rough, rtol=1e-4, atol=1e-4 * np.abs(rough).max(initial=0.0)):
                 out[column] = found
-        except (TypeError, ValueError, _COMPLEX):
+        except (TypeError, ValueError, COMPLEX):
             pass
     return out
 
@@ -360,7 +357,7 @@ class Remembering:
         if not self.element.evolves or self.element.conserves:
             return 0.0
         dt, after = float(self.span[0]), self.evaluate(y, v, t)[1]
-        mean = self.mean_force(x, y, t - 0.5 * dt, dt or TINY)
+        mean = self.mean_force(x, y, t - 0.5 * dt, dt or 1e-300)  # also of a span of zero
         lost = -np.sum(mean * (y - x)) + (self.potential_at(x, t) or 0.0) - (
             self.potential_at(y, t, after) or 0.0)
         self.values[:] = after
@@ -469,23 +466,28 @@ def _require_potential(bound, x, u, d):
                       "for a time-dependent force, the energy balance is that of the scheme")
 
 
-def require_derivatives(joint: BoundConstraint, sizes: Array, u: Array, d: Array) -> None:
+def require_derivatives(joint: BoundConstraint, sizes: Array) -> None:
+    """Raise InputError unless Jacobian and curvature of user-defined equations are derivatives."""
     multipliers = np.cos(np.arange(len(joint.equations)))
-    try:
-        values = along(lambda s: joint.value(u + s * d, 0.0))
-        before, J, after = (joint.jacobian(u + s * d, 0.0) for s in (-1.0, 0.0, 1.0))
-        found = joint.curvature(u, 0.0, multipliers)
-    except Exception:  # it may not be defined there
-        return
-    require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values, J @ d,
-                  1e-13 * max(1.0, np.abs(values[1]).max()) * np.abs(sizes).max())
-    turned = 0.0 * u
-    if found is not None:
-        i, j, v = found
-        np.add.at(turned, i, v * d[j])
-    require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero with constant = True,",
-                  "multipliers @ jacobian(u, t)",
-                  [multipliers @ one * sizes for one in (before, J, after)], turned * sizes)
+
+    def check(u: Array, d: Array) -> None:
+        try:
+            values = along(lambda s: joint.value(u + s * d, 0.0))
+            before, J, after = (joint.jacobian(u + s * d, 0.0) for s in (-1.0, 0.0, 1.0))
+            found = joint.curvature(u, 0.0, multipliers)
+        except Exception:  # it may not be defined there
+            return
+        require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values, J @ d,
+                      1e-13 * max(1.0, np.abs(values[1]).max()) * np.abs(sizes).max())
+        turned = 0.0 * u
+        if found is not None:
+            i, j, v = found
+            np.add.at(turned, i, v * d[j])
+        require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero with constant = True,",
+                      "multipliers @ jacobian(u, t)",
+                      [multipliers @ one * sizes for one in (before, J, after)], turned * sizes)
+
+    at_generic_displacements(check, sizes)
 
 
 def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
@@ -514,8 +516,6 @@ def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array
 #: a profile may be straight at first, have a bump, or rise only far away.
 ALONG = np.concatenate([s * np.append(np.linspace(0.01, 1.0, 100), (2.0, 4.0, 10.0))
                         for s in (1.0, -1.0)])
-#: Relative difference from a table that is round-off.
-CLOSE = 1e-9
 
 
 def everywhere(sizes: Array) -> Array:
@@ -530,7 +530,7 @@ def is_table(value: Callable[[Array, float], Array], u: Array,
     try:
         with np.errstate(all="ignore"):
             return all(np.all(np.abs(value(s * u, t) - table(s, t))
-                              <= CLOSE * sizes * max(1.0, s * s))
+                              <= 1e-9 * sizes * max(1.0, s * s))  # round-off
                        for k, s in enumerate(ALONG) for t in ((0.0, 0.37)[k % 2],))
     except Exception:  # it may not be defined there
         return False
@@ -589,46 +589,34 @@ class MemberForce(BoundForce):
         return repr(self.source)
 
 
-def _pairs(where, force):
-    item, N, dofs = where
-    refuse(np.shape(force) != (N,), "the force of {!r} must have the shape ({},), got {}", item, N,
-           np.shape(force))
-    return np.asarray(force)[dofs].reshape(-1, 2)
-
-
-def _matrix_on_pairs(where, derivative):
-    _, _, dofs = where
-    matrix, n = sparse.csr_array(derivative)[dofs][:, dofs], len(dofs) // 2
-    return matrix if sparse.issparse(derivative) else matrix.toarray().reshape(n, 2, n, 2)
-
-
-def _number(where, energy):
-    return energy if np.iscomplexobj(energy) else float(energy)
-
-
-#: What a bound force may have of an item of displacements: the names of both, and what makes of
-#: a result on all degrees of freedom one on pairs of those of the item.
-OF_ITEMS: dict[str, tuple[str, Any]] = {
-    **{name: (name, _pairs) for name in ("force", "mean_force", "mean")},
-    "evaluate": ("evaluate", lambda where, found: (_pairs(where, found[0]), found[1])),
-    "stiffness": ("stiffness", _matrix_on_pairs),
-    "resistance": ("damping", _matrix_on_pairs),
-    "mean_stiffness": ("mean_stiffness", _matrix_on_pairs),
-    **{name: (name, lambda where, found: found) for name in (
-        "start", "corrected", "relaxed", "passed", "search_intervals", "sample")}}
+#: What a bound force may have of an item of displacements besides its energy, by name.
+OF_ITEMS = ("force", "mean_force", "mean", "evaluate", "stiffness", "damping", "mean_stiffness",
+            "start", "corrected", "relaxed", "passed", "search_intervals", "sample")
 
 
 def of_pairs(where: tuple[Any, int, Array], name: str, *arguments: Any) -> Any:
     """What a bound force has of an item, at arguments of its pairs of DOFs, arrays (n, 2)."""
     item, N, dofs = where
-    own, result = OF_ITEMS.get(name, ("energy", _number))
     whole = []
     for x in arguments:
         whole.append(x)
         if np.ndim(x) == 2:
             whole[-1] = np.zeros(N, dtype=x.dtype)
             whole[-1][dofs] = np.ravel(x)
-    return result(where, getattr(item, own)(*whole))
+    found = getattr(item, name)(*whole)
+    # results on all degrees of freedom become those on the pairs of the item
+    if name == "energy":
+        return found if np.iscomplexobj(found) else float(found)
+    if name in ("stiffness", "damping", "mean_stiffness"):
+        matrix, n = sparse.csr_array(found)[dofs][:, dofs], len(dofs) // 2
+        return matrix if sparse.issparse(found) else matrix.toarray().reshape(n, 2, n, 2)
+    if name not in ("force", "mean_force", "mean", "evaluate"):
+        return found
+    force = found[0] if name == "evaluate" else found
+    refuse(np.shape(force) != (N,), "the force of {!r} must have the shape ({},), got {}", item, N,
+           np.shape(force))
+    force = np.asarray(force)[dofs].reshape(-1, 2)
+    return (force, found[1]) if name == "evaluate" else force
 
 
 def force_of(item: Any, layout: Layout) -> BoundForce:
@@ -650,11 +638,10 @@ def force_of(item: Any, layout: Layout) -> BoundForce:
     pairs = np.unique(dofs // 2)
     out.links = [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in pairs]
     where, past = (item, N, out.all_dofs), [item.start(), 0.0] if hasattr(item, "start") else []
-    for name in [name for name, (own, _) in OF_ITEMS.items() if hasattr(item, own)]:
-        setattr(out, name, partial(of_pairs, where, name))
-    if hasattr(item, "energy"):
-        name = "potential" if past else "potential_at"
-        setattr(out, name, partial(of_pairs, where, name))
+    names = {"damping": "resistance", "energy": "potential" if past else "potential_at"}
+    for name in (*OF_ITEMS, "energy"):
+        if hasattr(item, name):
+            setattr(out, names.get(name, name), partial(of_pairs, where, name))
     if hasattr(item, "stiffness"):
         out.changing = sparse.issparse(item.stiffness(zero, zero, 0.0, *past))
     out.evolves = getattr(item, "evolves", True)
@@ -669,9 +656,14 @@ def _array(function, u, t):
     return found.toarray() if sparse.issparse(found) else np.asarray(found)
 
 
-def constraint_of(item: Any, layout: Layout) -> BoundConstraint:
-    """The constraint of an item of displacements."""
-    out, zero = BoundConstraint(), np.zeros(layout.N)
+def user_parts(item: Any, layout: Layout, force: bool = True) -> list[Any]:
+    """The force and the constraint that a bound item has; ``force`` False leaves out the first."""
+    parts: list[Any] = []
+    if force and any(hasattr(item, name) for name in ("energy", "force", "mass", "evaluate")):
+        parts.append(force_of(item, layout))
+    if not hasattr(item, "constraint"):
+        return parts
+    out, zero, u = BoundConstraint(), np.zeros(layout.N), everywhere(layout.sizes)
     out.of_item, out.moving, out.name, out._key = item, item.moving, item.name, item._key
     vars(out)["value"] = partial(_array, item.constraint)
     if hasattr(item, "jacobian"):
@@ -679,18 +671,7 @@ def constraint_of(item: Any, layout: Layout) -> BoundConstraint:
     m = len(require_finite(f"constraint(u, t) of {item!r}", out.value(zero, 0.0), (None,)))
     out.equations = tuple(f"equation {k}" for k in range(m))
     J = require_finite(f"jacobian(u, t) of {item!r}", out.jacobian(zero, 0.0), (m, layout.N))
-    u = everywhere(layout.sizes)
     out.constant = out.tabled = is_table(
         out.value, u, lambda s, t: out.value(zero, t) + s * (J @ u), np.abs(J) @ np.abs(u))
-    at_generic_displacements(partial(require_derivatives, out, layout.sizes), layout.sizes)
-    return out
-
-
-def user_parts(item: Any, layout: Layout, force: bool = True) -> list[Any]:
-    """The force and the constraint that a bound item has; ``force`` False leaves out the first."""
-    out: list[Any] = []
-    if force and any(hasattr(item, name) for name in ("energy", "force", "mass", "evaluate")):
-        out.append(force_of(item, layout))
-    if hasattr(item, "constraint"):
-        out.append(constraint_of(item, layout))
-    return out
+    require_derivatives(out, layout.sizes)
+    return [*parts, out]

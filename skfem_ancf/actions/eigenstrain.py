@@ -29,17 +29,6 @@ from .symbols import Symbol, middle
 SECTION, ROUND_OFF = 6, 1e-12
 
 
-def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
-    """An eigenstrain where a term samples the strain, (ns, nelements)."""
-    term, layer, out = integral.term, integral.layer, []
-    for row, name in enumerate(COMPONENTS):
-        xi, eta = term.nodes(name), term.section_nodes
-        X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
-        values = eigen.of_layer(layer, *beam.across.coordinates(X))[row]
-        out.append(values - unmatched(beam, eigen, layer, X) if name == "yy" else values)
-    return np.concatenate(out, axis=1).T
-
-
 def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None = None) -> Array:
     """The part of eps_yy that a section develops freely and its element cannot represent."""
     # A section that bends freely under E0 has a linear eps_xx and S_yy = 0, thus eps_yy = E0_yy -
@@ -86,9 +75,6 @@ def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None =
 #: Largest number of products.
 MOST = 8
 
-#: Tolerance of the sum of products, relative to the largest value.
-CLOSE = 1e-9
-
 
 class EigenStrain(Load):
     """An eigenstrain E0: the stress is that of the strain E - E0.
@@ -118,9 +104,7 @@ class EigenStrain(Load):
 
     constant = False
     prestress = True
-    # of a bound one
-    _distribution: Any = None
-    # strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
+    # of a bound one: strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
     _strains: Any = None
     _stresses: Any = None
     #: True for nonlinear laws, whose forces are not proportional to the eigenstrain.
@@ -135,8 +119,8 @@ class EigenStrain(Load):
         super().__init__(beam, amplitude)
         if xx is None and yy is None and xy is None:
             raise InputError("an eigenstrain needs a component: give xx, yy or xy")
-        self.xx, self.yy, self.xy = (_number_or_function(f"eps_{name}", f) for name, f in (
-            ("xx", xx), ("yy", yy), ("xy", xy)))
+        self.xx, self.yy, self.xy = (f if f is None else _number_or_function(f"eps_{name}", f)
+                                     for name, f in (("xx", xx), ("yy", yy), ("xy", xy)))
 
     def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
         """(eps_xx, eps_yy, 2 eps_xy) of a layer at coordinates x, y (...), shape (3, ...)."""
@@ -151,10 +135,9 @@ class EigenStrain(Load):
         timed = {name: f for name, f in given.items() if takes(f, 3)}
         out: list[Item] = []
         for name, f in timed.items():
-            for g, c in products(self.given[name], f, beam):
+            for g, c in products(self.given[name], f, beam, self.amplitude):
                 only = {**dict.fromkeys(given), name: g}
-                amplitude = Amplitude(c.times(self.amplitude))
-                out.append(self._with(beam=k, amplitude=amplitude, **only))
+                out.append(self._with(beam=k, amplitude=Amplitude(c), at_rest=c(1.0), **only))
         if not timed or any(f is not None for name, f in given.items() if name not in timed):
             out.append(self._with(beam=k, **dict.fromkeys(timed)))
         return out
@@ -163,17 +146,21 @@ class EigenStrain(Load):
 
     def bind(self, beam: Beam) -> Load:
         bound = cast("EigenStrain", super().bind(beam))
-        bound._distribution = Distribution(eigen=bound)
-        function = getattr(self.amplitude, "function", None)
-        if isinstance(function, Coefficient):
-            bound.at_rest = function(1.0)
+        # elements that remember have the strain minus the eigenstrain
+        bound._distribution = Distribution() if remembers(beam) else Distribution(eigen=bound)
         kernel = beam.kernel
-        if remembers(beam):  # its elements have the strain minus the eigenstrain
-            bound._distribution = Distribution()
         if not beam.has_sections:
             bound.eigen_stresses, bound._stresses = _of_fibres(beam, self)
             return bound
-        bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
+        bound._strains = []
+        for one in kernel.integrals:  # where a term samples the strain, (ns, nelements)
+            term, layer, rows = one.term, one.layer, []
+            for row, name in enumerate(COMPONENTS):
+                xi, eta = term.nodes(name), term.section_nodes
+                X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+                values = self.of_layer(layer, *beam.across.coordinates(X))[row]
+                rows.append(values - unmatched(beam, self, layer, X) if name == "yy" else values)
+            bound._strains.append(np.concatenate(rows, axis=1).T)
         bound._stresses = list(map(stresses_of, kernel.elements, bound._strains))
         # nonlinear laws have the strains at the points in place of stresses
         bound.eigen_stresses = [
@@ -195,7 +182,7 @@ class EigenStrain(Load):
 
     def element_forces(self, u: Array, factor: float = 1.0) -> Array:
         """Element forces (nelements, nb, 2) at u (N,)."""
-        return -self.beam.kernel.eigenstrain_forces(self._scaled_stresses(factor), u)
+        return -self.beam.kernel.eigenstrain_forces([-factor * T for T in self.eigen_stresses], u)
 
     def small_forces(self, factor: float = 1.0) -> Array:
         """As :meth:`element_forces` at u = 0, linear in the strain."""
@@ -204,20 +191,17 @@ class EigenStrain(Load):
         return self.beam.kernel.forces_of([factor * T for T in self._stresses],
                                           np.zeros(self.beam.N))
 
-    def _scaled_stresses(self, factor):
-        return [-factor * given for given in self.eigen_stresses]
 
     def force(self, u: Array) -> Array:
         return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        kernel = self.beam.kernel
-        return -kernel.scatter(kernel.eigenstrain_forces(self._scaled_stresses(self._size), u0, u1))
+        kernel, stresses = self.beam.kernel, [-self._size * T for T in self.eigen_stresses]
+        return -kernel.scatter(kernel.eigenstrain_forces(stresses, u0, u1))
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        beam = self.beam
-        K = beam.kernel.eigenstrain_tangents(self._scaled_stresses(self._size), u)
-        return *entries_of(element_dofs(beam)), -K.ravel()
+        K = self.beam.kernel.eigenstrain_tangents([-self._size * T for T in self.eigen_stresses], u)
+        return *entries_of(element_dofs(self.beam)), -K.ravel()
 
     def potential(self, u: Array) -> float:
         if self._strains is not None:  # minus the integral of W(E) - W(E - factor E0)
@@ -236,8 +220,6 @@ class EigenStrain(Load):
                     for t, T in zip(self.beam.kernel.tables, self.eigen_stresses)
                     if t.law.kind == LINEAR)
 
-    def distribution(self, u: Array) -> Distribution:
-        return self._distribution
 
     # fields
 
@@ -300,7 +282,7 @@ class Temperature(EigenStrain):
     def __init__(self, change: Any, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         Load.__init__(self, beam, amplitude)
-        self.change = _number_or_function("the temperature", change, False)
+        self.change = _number_or_function("the temperature", change)
 
     def bind(self, beam: Beam) -> Load:
         if not any(layer.material.thermal_expansion for layer in beam.across.layers):
@@ -315,9 +297,7 @@ class Temperature(EigenStrain):
         return np.array([T, T, 0.0 * T])
 
 
-def _number_or_function(name, value, optional=True):
-    if value is None and optional:
-        return None
+def _number_or_function(name, value):
     if callable(value):
         return require_function(name, value, "of (x, y)")
     with retold(InputError, "{} must be a number or a function of (x, y), got {!r}", name, value):
@@ -332,54 +312,43 @@ def _evaluated(name, f, x, y):
 
 def _of_fibres(beam, eigen):
     """The kernel's arguments for a cable, and the linear stresses, a list for each table."""
-    rules, tables = list(beam.across.rules(8)), beam.kernel.tables
-    if len(tables) == 1 and tables[0].law.kind != HISTORY:
-        found = [_resultants(beam, eigen, rules)]
-        return found, found
-    given, stresses = [], []
-    for t, layer in zip(tables, beam.across.layers):
-        stresses.append(_resultants(beam, eigen, [one for one in rules if one[0] is layer]))
-        given.append(stresses[-1])
-        if t.law.kind == HISTORY:
-            X = fibre_points(layer, beam.kernel.points)[1]
-            E0 = eigen.of_layer(layer, *beam.across.coordinates(X))[0]
-            given[-1] = (E0 + np.zeros((beam.mesh.nelements, 1))).T[None]
-    return given, stresses
-
-
-def _resultants(beam, eigen, rules):
-    """Weighted normal forces and moments of a cable's eigenstrain, (ne, 2 points)."""
-    xi = beam.kernel.points
-    out = np.zeros((2, beam.mesh.nelements, len(xi)))
-    across = beam.across
-    for layer, (eta, w) in rules:
+    tables, across, xi = beam.kernel.tables, beam.across, beam.kernel.points
+    together = len(tables) == 1 and tables[0].law.kind != HISTORY  # one table has all layers
+    # normal forces and moments of each table, (2, ne, points)
+    both = np.zeros((len(tables), 2, beam.mesh.nelements, len(xi)))
+    given: list[Any] = [None] * len(tables)
+    for number, (layer, (eta, w)) in enumerate(across.rules(8)):
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
         x, y = across.coordinates(X)
         size = (layer.material.axial_modulus * across.breadth(layer, X, times="grade")
                 * beam.mesh.mapping().height(X[0])[0] * np.tile(w, len(xi)))
-        S0 = size * eigen.of_layer(layer, x, y)[0]
-        for k, moment in enumerate((S0, -S0 * y)):
-            out[k] += moment.reshape(*out[k].shape, -1).sum(axis=-1)
-    out *= beam.kernel.weights
-    return np.concatenate(out, axis=1)
+        S0, k = size * eigen.of_layer(layer, x, y)[0], 0 if together else number
+        for out, moment in zip(both[k], (S0, -S0 * y)):
+            out += moment.reshape(*out.shape, -1).sum(axis=-1)
+        if tables[k].law.kind == HISTORY:
+            E0 = eigen.of_layer(layer, *across.coordinates(fibre_points(layer, xi)[1]))[0]
+            given[k] = (E0 + np.zeros((beam.mesh.nelements, 1))).T[None]
+    stresses = [np.concatenate(one * beam.kernel.weights, axis=1) for one in both]
+    return [s if E0 is None else E0 for s, E0 in zip(stresses, given)], stresses
 
 
 # functions of time too
 
 
-def products(name: str, function: Callable[..., Any], beam: Beam
-             ) -> "list[tuple[Callable[..., Any], Coefficient]]":
+def products(name: str, function: Callable[..., Any], beam: Beam, amplitude: TimeFunction
+             ) -> list[tuple[Callable[..., Any], Callable[..., Any]]]:
     """A function (x, y, t) as a sum of products of functions of (x, y) and of t, exact where such a
     sum exists: by empirical interpolation at some times and as many places (Barrault, Maday,
-    Nguyen, Patera: "An empirical interpolation method", Comptes Rendus Mathematique 339 (2004))."""
+    Nguyen, Patera: "An empirical interpolation method", Comptes Rendus Mathematique 339 (2004)).
+    Those of t are multiplied by the amplitude."""
     X = np.array(np.meshgrid(np.linspace(0.02, 0.97, 7), np.linspace(0.01, 0.98, 9))
                  ).reshape(2, -1)
     x, y = (c.ravel() for c in beam.across.coordinates(X))
     times = np.append(np.linspace(0.0, 1.0, 33), np.geomspace(1e-3, 1e3, 40) * 1.0371)
-    at = [_AtTime(function, float(t)) for t in times]
+    at = [partial(_at_time, function, float(t)) for t in times]
     F = np.array([_evaluated(f"{name}(t={t:g})", f, x, y) for t, f in zip(times, at)])
     size, left, chosen, places = np.max(np.abs(F)), F.copy(), [], []
-    while np.max(np.abs(left)) > CLOSE * size:
+    while np.max(np.abs(left)) > 1e-9 * size:
         k, p = np.unravel_index(np.argmax(np.abs(left)), left.shape)
         chosen.append(k)
         places.append(p)
@@ -388,35 +357,17 @@ def products(name: str, function: Callable[..., Any], beam: Beam
                "an amplitude each", name, MOST)
         left = F - np.linalg.solve(F[np.ix_(chosen, places)].T, F[:, places].T).T @ F[chosen]
     inverse = np.linalg.inv(F[np.ix_(chosen, places)])
-    return [(at[k], Coefficient(name, function, x[places], y[places], inverse[:, j]))
-            for j, k in enumerate(chosen)]
+    return [(at[k], partial(_factor, name, function, x[places], y[places], inverse[:, j],
+                            amplitude)) for j, k in enumerate(chosen)]
 
 
-class _AtTime:
-    """A function (x, y, t) at fixed t."""
-
-    def __init__(self, function, t):
-        self.function, self.t = function, t
-
-    def __call__(self, x, y):
-        return self.function(x, y, self.t)
+def _at_time(function, t, x, y):
+    return function(x, y, t)
 
 
-class Coefficient:
+def _factor(name, function, x, y, weights, amplitude, t):
     """The time factor of one product: weighted values of the function at some places."""
-
-    def __init__(self, name: str, function: Callable[..., Any], x: Array, y: Array,
-                 weights: Array, amplitude: TimeFunction = None) -> None:
-        self.name, self.function, self.x, self.y, self.weights = name, function, x, y, weights
-        self.amplitude = amplitude
-
-    def times(self, amplitude: TimeFunction) -> "Coefficient":
-        """The product with a function of time."""
-        return Coefficient(self.name, self.function, self.x, self.y, self.weights, amplitude)
-
-    def __call__(self, t):
-        if np.ndim(t):
-            return np.array([self(s) for s in t])
-        at = _AtTime(self.function, float(t))
-        found = _evaluated(f"{self.name}(t={t:g})", at, self.x, self.y)
-        return float(found @ self.weights) * (1.0 if self.amplitude is None else self.amplitude(t))
+    if np.ndim(t):
+        return np.array([_factor(name, function, x, y, weights, amplitude, s) for s in t])
+    found = _evaluated(f"{name}(t={t:g})", partial(_at_time, function, float(t)), x, y)
+    return float(found @ weights) * (1.0 if amplitude is None else amplitude(t))

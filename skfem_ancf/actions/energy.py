@@ -33,11 +33,13 @@ class DensityPoints(NamedTuple):
     of: Any = None
 
 
-def points_of(dofs: Array, X: Array, weights: Array, N: Array, grad: Array, of: Any
-              ) -> DensityPoints:
-    """DensityPoints from local functions N, (nb, n, np), and their gradients, (nb, 2, n, np)."""
+def points_of(beam: Beam, elements: Array, X: Array, weights: Array, of: Any) -> DensityPoints:
+    """DensityPoints at reference points of elements of a beam."""
+    mapping = beam.mesh.mapping()
+    N, grad = beam.element.functions(mapping, X, elements)
     both = np.stack(np.broadcast_arrays(N, grad[:, 0], grad[:, 1]), axis=-1)
-    return DensityPoints(dofs, X, weights, np.ascontiguousarray(both.swapaxes(0, 1)), of)
+    return DensityPoints(element_dofs(beam, elements), np.asarray(mapping.F(X, elements)), weights,
+                         np.ascontiguousarray(both.swapaxes(0, 1)), of)
 
 
 class Density(Load):
@@ -50,22 +52,17 @@ class Density(Load):
     """
 
     constant = False
+    first_order = True
+    # of a subclass
+    _slope: Any
+    _curvature: Any
     # of a bound one
     _parts: Sequence[DensityPoints]
     _time = 0.0
 
-    @property
-    def first_order(self) -> bool:
-        return True
 
     def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         return self.factor(t), self if t is None else self._with(_time=float(t))
-
-    def _slope(self, y, part):
-        raise NotImplementedError
-
-    def _curvature(self, y, part):
-        raise NotImplementedError
 
     def _variables(self, u, part):
         """The six variables at points, shape (6, n, np)."""
@@ -216,18 +213,6 @@ def by_loops(psi: Any, gradient: Any, hessian: Any,
 #: Where an energy acts beside places of the boundary.
 EVERYWHERE = "cells", "axis"
 _LOWER = np.tril_indices(6)
-#: Relative round-off of energies.
-_ROUND_OFF = 1e-15
-#: Tolerance of invariance under rigid motions, relative to the largest density.
-_INVARIANT = 1e-9
-
-
-class _Where(NamedTuple):
-    """Location of points: BODY, AXIS, a face or -1, the elements (n,), and the rule."""
-
-    where: int
-    elements: Array
-    rule: Any
 
 
 class Energy(Density):
@@ -333,12 +318,47 @@ class Energy(Density):
                              f"with positions linear in the degrees of freedom; not on {beam!r}")
         bound = self._with(beam=beam, _parts=self._points(beam))
         at_generic_displacements(bound._require_derivatives, beam.sizes)
-        if self.check:
-            bound._require_invariance()
+        if not self.check:
+            return bound
+        shift, Q = beam.size * np.array([0.7, -0.4]), np.array([[0.6, -0.8], [0.8, 0.6]])
+        for part in bound._parts:
+            y = bound._variables(1e-2 * beam.sizes * np.cos(np.arange(beam.N)), part)
+            moved = y.copy()
+            moved[:2] += shift[:, None, None]
+            turned = np.concatenate([moved[:2], np.einsum(
+                "ij,jk...->ik...", Q, y[2:].reshape(2, 2, *y.shape[1:])).reshape(y[2:].shape)])
+            psi, *others = (bound._density(x, part) for x in (y, moved, turned))
+            for what, other in zip(("moved", "turned"), others):
+                refuse(np.max(np.abs(other - psi)) > 1e-9 * np.max(np.abs(psi)),
+                       "psi of {!r} changes where the body is {} as a whole: it is not a strain "
+                       "energy, which depends on F^T F. Leave out check=True for external actions, "
+                       "as a foundation or a field", bound, what)
         return bound
 
-    def _points(self, beam):
-        return _parts_of(beam, self.over)
+    def _points(self, beam: Beam) -> list[DensityPoints]:
+        """Points of the cells, the axis or a place of a beam; of each the location BODY, AXIS, a
+        face or -1, the elements (n,), and the rule."""
+        over, out, every = self.over, [], np.arange(beam.mesh.nelements)
+        if not _everywhere(over):
+            rule = gauss(beam.element.facet_points + 1)
+            try:
+                surfaces = surfaces_of(beam, over, len(rule[0]))
+            except NameUnknown as error:
+                raise NameUnknown("place", error.name, EVERYWHERE + error.known) from None
+            return [points_of(beam, one.elements, one.X, one.areas, (
+                -1 if one.side in (LEFT, RIGHT) else one.side // UPPER, one.elements, rule))
+                for one in surfaces]
+        xi, w = gauss(points_along(beam) + 1)
+        if over == "axis":
+            X = np.array([xi, 0.5 + 0.0 * xi])
+            lengths = np.sqrt(np.sum(beam.mesh.mapping().DF(X)[:, 0] ** 2, axis=0))
+            return [points_of(beam, every, X, lengths * w, (AXIS, every, (xi, w)))]
+        for layer, section in beam.across.rules(beam.element.order + 1, inertia=True):
+            X, W = product_rule((xi, w), section)
+            weights = np.broadcast_to(beam.across.volume(layer, X, W, every, full=True),
+                                      (len(every), len(W)))
+            out.append(points_of(beam, every, X, weights, (BODY, every, (xi, section[0]))))
+        return out
 
     # the density and its derivatives at the six variables y, (6, n, np)
 
@@ -400,7 +420,7 @@ class Energy(Density):
         for part in self._parts:
             a, b = (self._density(self._variables(u, part), part) for u in (u0, u1))
             gain += float(np.sum(part.weights * (b - a)))
-            noise += _ROUND_OFF * float(np.sum(part.weights * (np.abs(a) + np.abs(b))))
+            noise += 1e-15 * float(np.sum(part.weights * (np.abs(a) + np.abs(b))))
         return gain, noise
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
@@ -455,21 +475,6 @@ class Energy(Density):
                 require_slope(f"hessian of {self!r}", "gradient", slopes,
                               np.einsum("klep,lep->kep", H, dy))
 
-    def _require_invariance(self):
-        shift, Q = self.beam.size * np.array([0.7, -0.4]), np.array([[0.6, -0.8], [0.8, 0.6]])
-        for part in self._parts:
-            y = self._variables(1e-2 * self.beam.sizes * np.cos(np.arange(self.beam.N)), part)
-            moved = y.copy()
-            moved[:2] += shift[:, None, None]
-            turned = np.concatenate([moved[:2], np.einsum(
-                "ij,jk...->ik...", Q, y[2:].reshape(2, 2, *y.shape[1:])).reshape(y[2:].shape)])
-            psi, *others = (self._density(x, part) for x in (y, moved, turned))
-            for what, other in zip(("moved", "turned"), others):
-                refuse(np.max(np.abs(other - psi)) > _INVARIANT * np.max(np.abs(psi)),
-                       "psi of {!r} changes where the body is {} as a whole: it is not a strain "
-                       "energy, which depends on F^T F. Leave out check=True for external actions, "
-                       "as a foundation or a field", self, what)
-
 
 def check_derivatives(energy: Energy, beam: Beam, u: ArrayLike | None = None) -> None:
     """Raise InputError unless gradient and hessian of an energy are derivatives of its psi.
@@ -515,39 +520,3 @@ def _shaped(name, found, shape):
 
 def _everywhere(over):
     return isinstance(over, str) and over in EVERYWHERE
-
-
-def _parts_of(beam, over):
-    """Points of the cells, the axis or a place of a beam."""
-    mapping, along, out = beam.mesh.mapping(), points_along(beam) + 1, []
-    every = np.arange(beam.mesh.nelements)
-    body = over if _everywhere(over) else None
-    if body == "cells":
-        axis = gauss(along)
-        for layer, section in beam.across.rules(beam.element.order + 1, inertia=True):
-            X, W = product_rule(axis, section)
-            weights = np.broadcast_to(beam.across.volume(layer, X, W, every, full=True),
-                                      (len(every), len(W)))
-            out.append(_points(beam, every, X, weights, _Where(BODY, every, (axis[0], section[0]))))
-    elif body == "axis":
-        xi, w = gauss(along)
-        X = np.array([xi, 0.5 + 0.0 * xi])
-        lengths = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))
-        out.append(_points(beam, every, X, lengths * w, _Where(AXIS, every, (xi, w))))
-    else:
-        rule = gauss(beam.element.facet_points + 1)
-        try:
-            surfaces = surfaces_of(beam, over, len(rule[0]))
-        except NameUnknown as error:
-            raise NameUnknown("place", error.name, EVERYWHERE + error.known) from None
-        for one in surfaces:
-            where = -1 if one.side in (LEFT, RIGHT) else one.side // UPPER
-            out.append(_points(beam, one.elements, one.X, one.areas,
-                               _Where(where, one.elements, rule)))
-    return out
-
-
-def _points(beam, elements, X, weights, of):
-    mapping = beam.mesh.mapping()
-    return points_of(element_dofs(beam, elements), np.asarray(mapping.F(X, elements)), weights,
-                     *beam.element.functions(mapping, X, elements), of)

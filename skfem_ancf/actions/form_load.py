@@ -9,21 +9,16 @@ from skfem.assembly import BilinearForm, FacetBasis, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from ..beam import AXIS, BODY, Distribution, Domain, Sampled, WhichMember, facets_along
-from ..core import (Array, CallbackError, InputError, Place, TimeFunction, explained, gauss, refuse,
-                    require_finite, require_flag, require_slope, shown, warnings_as_errors)
-from .energy import Density, points_of
-from .bound import at_generic_displacements
+from ..beam import AXIS, BODY, Distribution, Domain, Sampled, WhichMember, station_of_node
+from ..core import (Array, CallbackError, Place, TimeFunction, explained, gauss, refuse,
+                    require_finite, require_flag, require_slope, warnings_as_errors)
+from .energy import Density, DensityPoints
+from .bound import COMPLEX, at_generic_displacements
 from .loads import DeadLoad
 
 logger = logging.getLogger(__name__)
 #: Steps of differences, relative to the size of a variable.
 STEP = 1e-6
-#: A derivative is symmetric up to this relative error of differences; a time to find out at.
-SYMMETRIC, OTHER = 1e-6, 0.7310585786
-#: Gauss points for the work from the reference configuration, and in a time step.
-WORK, MEAN = 6, 3
-_COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
 class _Parameters(FormExtraParams):
@@ -90,9 +85,9 @@ class FormLoad(Density):
                  amplitude: TimeFunction = None, tangent: BilinearForm | None = None,
                  scaled: bool = True) -> None:
         super().__init__(beam, amplitude)
-        if not isinstance(form, LinearForm):
-            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
-                             "form is a subclass of skfem_ancf.actions.loads.Load, for scene.add")
+        refuse(not isinstance(form, LinearForm), "a load is a scikit-fem LinearForm, got {!r}; "
+               "what is no form is a subclass of skfem_ancf.actions.loads.Load, for scene.add",
+               form)
         refuse(isinstance(boundary, BilinearForm), "the second argument of a load is the boundary, "
                "got {!r}: give the derivative as tangent=", boundary)
         refuse(tangent is not None and not isinstance(tangent, BilinearForm), "tangent must be a "
@@ -106,16 +101,15 @@ class FormLoad(Density):
                 scaled=self.scaled)
         basis = (beam.exact_basis() if self.boundary is None else
                  beam.facet_basis(self.boundary))
-        fields = [b[0] for b in basis.basis[::2]]
-        part = points_of(basis.element_dofs.T, np.asarray(basis.default_parameters()["x"]),
-                         basis.dx, np.array([f[0] for f in fields]),
-                         np.array([f.grad[0] for f in fields]), None)
+        functions = np.array([(f[0], *f.grad[0]) for f, in basis.basis[::2]])
+        part = DensityPoints(basis.element_dofs.T, np.asarray(basis.default_parameters()["x"]),
+                             basis.dx, np.ascontiguousarray(functions.transpose(2, 0, 3, 1)))
         bound = self._with(beam=beam, _parts=[part], _basis=basis)
         P, w = bound._evaluated(bound._variables(np.zeros(beam.N), part))
         require_finite(f"the force of {bound!r}", P)
         used = vars(w).get("asked", set()) & {"r", "F", "t"}
         if not used:
-            dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._distribution(P))
+            dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._acting(P))
             return dead._with(scaled=self.scaled)
         refuse(not beam.has_sections, "a form with w.r acts on elements with sections, as "
                "ElementBeamANCF(2), and not on {!r}", beam)
@@ -123,8 +117,21 @@ class FormLoad(Density):
             logger.info("%r has no tangent=: its derivative is found by differences", self)
         else:
             at_generic_displacements(bound._require_tangent, beam.sizes)
-        times = (0.0, OTHER) if "t" in used else (0.0,)
-        return bound._with(symmetric=bound._is_conservative(times))
+        # It is conservative if its derivative is symmetric, but for errors of differences, at some
+        # displacements and times, one at which nothing is zero.
+        sizes = np.array([beam.size] * 2 + [1.0] * 4)[:, None, None]
+        times = (0.0, 0.7310585786) if "t" in used else (0.0,)
+        for t, scale in [(t, scale) for t in times for scale in (0.0, 1e-2)]:
+            y = bound._variables(scale * beam.sizes * np.cos(np.arange(beam.N)), part)
+            try:
+                now = bound._with(_time=t)
+                A, P = now._curvature(y, part) * sizes * sizes[:, None], now._slope(y, part)
+            except CallbackError:
+                return bound
+            off, size = np.abs(A - A.swapaxes(0, 1)).max(), np.abs(A).max()
+            if not off <= 1e-6 * (size + STEP * np.abs(P * sizes).max()):
+                return bound
+        return bound._with(symmetric=True)
 
     def _evaluated(self, y):
         w = self._fields(y)
@@ -146,7 +153,7 @@ class FormLoad(Density):
         """Values of a user-defined form at the points."""
         what = f"the form of a load, form({'u, ' * (len(args) == 3)}v, w),"
         hint = "it must return a real number at each point, as v[1]"
-        with explained("{} fails", hint, CallbackError, what), warnings_as_errors(_COMPLEX):
+        with explained("{} fails", hint, CallbackError, what), warnings_as_errors(COMPLEX):
             found = np.empty(self._basis.dx.shape)
             try:
                 found[:] = form(*args)
@@ -171,23 +178,6 @@ class FormLoad(Density):
         return np.stack([(self._slope(y + d, part) - self._slope(y - d, part)) / (2.0 * step)
                          for step, d in zip(steps, (steps * np.eye(6))[:, :, None, None])], axis=1)
 
-    def _is_conservative(self, times):
-        """True if the derivative is symmetric at some displacements and times."""
-        part, = self._parts
-        sizes = np.array([self.beam.size] * 2 + [1.0] * 4)[:, None, None]
-        for t in times:
-            for scale in (0.0, 1e-2):
-                y = self._variables(scale * self.beam.sizes * np.cos(np.arange(self.beam.N)), part)
-                try:
-                    now = self._with(_time=t)
-                    A, P = now._curvature(y, part) * sizes * sizes[:, None], now._slope(y, part)
-                except CallbackError:
-                    return False
-                off, size = np.abs(A - A.swapaxes(0, 1)).max(), np.abs(A).max()
-                if not off <= SYMMETRIC * (size + STEP * np.abs(P * sizes).max()):
-                    return False
-        return True
-
     def potential(self, u: Array) -> float | None:
         if not self.symmetric:
             return None
@@ -195,13 +185,13 @@ class FormLoad(Density):
         rest = self._variables(np.zeros(self.beam.N), part)
         d = self._variables(u, part) - rest
         return float(sum(w * np.sum(part.weights * self._slope(rest + s * d, part) * d)
-                         for s, w in zip(*gauss(WORK))))
+                         for s, w in zip(*gauss(6))))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """Mean of the force on a straight path: of exact work for polynomials of degree 5."""
         if not self.symmetric:
             return super().mean_force(u0, u1)
-        return sum((w * self.force(u0 + s * (u1 - u0)) for s, w in zip(*gauss(MEAN))),
+        return sum((w * self.force(u0 + s * (u1 - u0)) for s, w in zip(*gauss(3))),
                    np.zeros(self.beam.N))
 
     def _require_tangent(self, u, d):
@@ -214,18 +204,23 @@ class FormLoad(Density):
 
     def distribution(self, u: Array) -> Distribution | None:
         part, = self._parts
-        return self._distribution(-self._slope(self._variables(u, part), part))
+        return self._acting(-self._slope(self._variables(u, part), part))
 
-    def _distribution(self, P):
+    def _acting(self, P):
         """Distribution of a force over the body; None if it acts on derivatives."""
         basis, f = self._basis, P[:2]
         if np.any(P[2:]):
             return None
         if isinstance(basis, FacetBasis):
-            groups, stations = facets_along(self.beam.mesh, basis)
-            per_xi = f * basis.dx / basis.W
-            return Distribution(stations=stations, sampled=tuple(
-                Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
+            mesh, facets, sampled = self.beam.mesh, np.asarray(basis.find), []
+            n, ne, xi = mesh.p.shape[1], mesh.nelements, np.asarray(basis.X[0]).ravel()
+            for side in (0, 1):  # bottom and top; others are ends
+                on, = np.nonzero((facets >= n + side * ne) & (facets < n + (side + 1) * ne))
+                if len(on):
+                    sampled.append(Sampled(side, facets[on] - n - side * ne, xi,
+                                           (f * basis.dx / basis.W)[:, on]))
+            return Distribution(sampled=tuple(sampled), stations=tuple(
+                station_of_node(mesh, int(k)) for k in facets[facets < n]))
         xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
         if not self.beam.has_sections:
             return Distribution(sampled=(

@@ -8,10 +8,9 @@ import numpy as np
 from scipy import sparse
 
 from ..beam import (AXIS, Beam, Distribution, Domain, Layout, RigidBody, Sampled, WhichBeam,
-                    WhichMember, add_nodal, divided, on_body, on_facets, on_points,
-                    stations_of_vector, surfaces_of)
+                    WhichMember, add_nodal, direction, divided, element_dofs, entries_of, on_body,
+                    on_facets, on_points, stations_of_vector, surfaces_of)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
-from ..beam.kinematics import direction, element_dofs, entries_of
 from ..core import (AncfError, Array, ArrayLike, InputError, ModelWarning, Place, TimeFunction,
                     along, ask_field, ask_number, gauss, is_builtin, read_only, refuse, refuse_any,
                     require_finite, require_finite_scalar, require_function, require_slope, sample,
@@ -20,12 +19,8 @@ from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .bound import MemberForce, at_generic_displacements, require_entries, user_parts
 from .item import Item, on_each, takes
-from .places import Vector, at_node, dense_entries, members_at, nearest_of, section
+from .places import Vector, at_node, dense_entries, members_at, section
 from .symbols import (ARROWS, Symbol, arrows_along, faces_of, force_symbol, inside, values_at)
-
-#: Warn of a traction on a cable if its neglected moment exceeds these parts of force times length,
-#: and of force times height (round-off).
-LEVER, ROUND_OFF = 0.01, 1e-12
 
 
 class Amplitude:
@@ -124,6 +119,8 @@ class Load(Item):
     #: elements), see :func:`~skfem_ancf.beam.strain_energy.eigenstrain_body_of`.
     eigen_stresses: Sequence[Array] = ()
     for_bodies = for_domains = False
+    #: Of a bound one, if it is known.
+    _distribution: Any = None
 
     @property
     def first_order(self) -> bool:
@@ -182,6 +179,8 @@ class Load(Item):
         """Distribution of the force over the body at the displacement ``u``, for recovered fields.
         By default it acts on the nodes, or on the point inside an element, whose degrees of freedom
         it acts on; None (unknown) if these are neighbours."""
+        if self._distribution is not None:
+            return self._distribution
         stations = stations_of_vector(self.beam, self.force(u))
         return None if stations is None else Distribution(stations=stations)
 
@@ -301,7 +300,7 @@ class Weight(Load):
 def number_at(layout: Layout, at: Any, beam: Any) -> int:
     """The number of a beam or body; if none is named, of the one that has a point."""
     if beam is None and at is not None and len(layout.members) > 1:
-        found = nearest_of(layout, at, members_at(layout, at))
+        found = members_at(layout, at, nearest=True)
         if len(found) == 1:
             return found[0]
     return layout.number(beam)
@@ -351,7 +350,7 @@ class Traction(Load):
                 kept += length * np.sum(np.abs(across))
                 size += beam.mesh.height * np.sum(np.hypot(along, across))
             left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
-            if left_out > LEVER * kept + ROUND_OFF * size:
+            if left_out > 0.01 * kept + 1e-12 * size:  # that is round-off
                 warn(f"a traction on {beam!r} acts on its axis: it leaves out a moment of "
                      f"{left_out:.3g} by the distance of the face. Use an element with sections, "
                      "as ElementBeamANCF(2), or give an end its moment by scene.moment",
@@ -431,7 +430,7 @@ class Pressure(Load):
     # of a bound one
     matrix: Any
     _rows: Any
-    _distribution: Any
+
 
     def __init__(self, boundary: Place, p: float, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -459,9 +458,6 @@ class Pressure(Load):
             column))), shape=(beam.N, beam.N)).tocsr()
         return self._with(beam=beam, _rows=rows, matrix=rows.tocoo(),
                           _distribution=on_facets(beam.mesh, facets, pressure=self.p))
-
-    def distribution(self, u: Array) -> Distribution | None:
-        return self._distribution
 
     def force(self, u: Array) -> Array:
         return self._rows @ (self.beam.q0_local + u)
@@ -565,19 +561,16 @@ class EndMoment(Load):
 
 # loads that depend on time
 
-_NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
-
 
 class TimedLoad(Load):
     """A force that depends on time and not on the displacement. A subclass defines :meth:`places`
     or :meth:`at`. Single static solutions take the load at time 1; :meth:`skfem_ancf.Scene.run` and
     motions take the current time."""
 
-    constant = False
+    constant = first_order = False
     # of the load at a time
     _time: float | None = None
     _vector: Any = None
-    _distribution: Any = None
     _last: Any = None
 
     def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
@@ -587,10 +580,6 @@ class TimedLoad(Load):
     def at(self, t: float) -> tuple[Array, Distribution]:
         """Force (N,) at time t and its distribution; by default from :meth:`places`."""
         return on_points(self.beam, self.places(t))
-
-    @property
-    def first_order(self) -> bool:
-        return False
 
     def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         last, time = self._last, 1.0 if t is None else float(t)
@@ -609,7 +598,8 @@ class TimedLoad(Load):
         return self.force(u1)
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        return _NONE
+        none = np.zeros(0, dtype=int)
+        return none, none, np.zeros(0)
 
     def potential(self, u: Array) -> float:
         return -float(self.force(u) @ u)

@@ -7,8 +7,8 @@ import numpy as np
 
 from ..beam import Beam, Domain, Layout, RigidBody, WhichMember
 from ..beam.kinematics import direction as direction_of, direction_weights, locate, probe_reference
-from ..core import Array, ArrayLike, InputError, MeshError, refuse, require_finite, shown
-from ..mesh.places import as_point, is_point, node_of, points_of_rows
+from ..core import Array, ArrayLike, MeshError, refuse, require_finite
+from ..mesh.places import as_point, is_point, node_of
 
 #: Name of the ground, in place of a beam.
 GROUND = "ground"
@@ -42,13 +42,6 @@ class Vector:
     def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
         """Derivative of ``direction . vector``: DOFs and values."""
         return self.dofs.ravel(), (np.asarray(direction)[:, None] * self.weights).ravel()
-
-
-def products(a: Vector, b: Vector, K: Array) -> tuple[Array, Array, Array]:
-    """Second derivative by the DOFs of ``a . K b``, K (2, 2)."""
-    # Rows, columns and values (k,), of a by b: the other half has both exchanged.
-    values = np.einsum("ij,ik,jl->ikjl", K, a.weights, b.weights)
-    return dense_entries(a.dofs, b.dofs, values)
 
 
 def dense_entries(rows: Array, columns: Array, values: Array) -> tuple[Array, Array, Array]:
@@ -167,32 +160,26 @@ def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) 
     return found
 
 
-def members_at(layout: Layout, at: ArrayLike) -> list[int]:
-    """Numbers of the beams and bodies that contain a material point."""
-    found = []
-    if not isinstance(at, str):
+def members_at(layout: Layout, at: ArrayLike, nearest: bool = False) -> list[int]:
+    """Numbers of the beams and bodies that contain a material point; with ``nearest``, if all are
+    beams, of those with the nearest axes."""
+    found, beams, named = [], [], isinstance(at, str)
+    if not named:
         at = as_point(at)
     for k, member in enumerate(layout.members):
         if not isinstance(member, Beam):
-            if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
+            if not named and member.contains(np.reshape(at, (2, 1)))[0]:
                 found.append(k)
             continue
         try:
-            locate(member, at)
+            beams.append((k, member, *locate(member, at)))
         except MeshError:
             continue
         found.append(k)
-    return found
-
-
-def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
-    """The members ``found`` with the nearest axes if all are beams, else all."""
-    beams: list[Any] = [layout.members[k] for k in found]
-    if len(found) < 2 or isinstance(at, str) or not all(isinstance(b, Beam) for b in beams):
+    if not nearest or named or len(found) < 2 or len(beams) < len(found):
         return found
-    where = [(b, *locate(b, at)) for b in beams]
-    off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for b, e, X in where]
-    return [k for k, b, d in zip(found, beams, off) if d <= min(off) + b.finder.equal]
+    off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for _, b, e, X in beams]
+    return [k for (k, b, *_), d in zip(beams, off) if d <= min(off) + b.finder.equal]
 
 
 def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
@@ -209,8 +196,7 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
     found = members_at(layout, place) if isinstance(place, str) else []
     if not found:
         place = require_finite("a point of a spring or a joint", place, (2,))
-        found = members_at(layout, place)
-    found = nearest_of(layout, place, found)
+        found = members_at(layout, place, nearest=True)
     if len(found) > 1 and layout.nodes is not None:  # they share a node
         found = [k for k, *_ in layout.nodes.ends_at(layout, place)][:1] or found
     names = [layout.members[k].name or k for k in found]
@@ -223,18 +209,6 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
         place if isinstance(place, str) else tuple(map(float, place)))
 
 
-def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
-    """A value for each of n beams: given once for all, or once for each."""
-    refuse(value is None, "a joint needs {}", what)
-    value = points_of_rows(value)
-    if isinstance(value, (str, np.ndarray)) or callable(value) or is_point(value):  # one place
-        return (value,) * n
-    if isinstance(value, (tuple, list)) and len(value) == n:
-        return tuple(value)
-    raise InputError(f"a joint of {n} beams needs {what}, one for all of them or one for each, as "
-                     f"at=('right', 'left'), got {shown(value)}")
-
-
 def both_of(name: str, place: Any) -> tuple[Any, Any]:
     """A beam or body and a place on it; a RigidBody alone has the place None."""
     if isinstance(place, RigidBody):
@@ -242,14 +216,6 @@ def both_of(name: str, place: Any) -> tuple[Any, Any]:
     refuse(not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place),
            "{} is a beam with a place of it, as (1, 'left'), or a RigidBody, got {!r}", name, place)
     return place[0], place[1]
-
-
-def several(beams: Any) -> tuple[Any, ...]:
-    """Check the beams and bodies of a joint, two at least."""
-    refuse(not isinstance(beams, (tuple, list)) or len(beams) < 2, "beams must be two beams or "
-           "rigid bodies or more, by Beam, RigidBody, name or number, or 'ground', got {!r}", beams)
-    refuse(all(map(is_ground, beams)), "a joint needs a beam or a rigid body, got {!r}", beams)
-    return tuple(beams)
 
 
 def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:

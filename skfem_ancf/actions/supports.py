@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..beam import Beam, Domain, Layout, WhichBeam, on_body
-from ..beam.kinematics import plane
+from ..beam import Beam, Domain, Layout, WhichBeam, on_body, plane
 from ..core import Place, SupportError, refuse, require_finite_scalar, require_option, shown
 from ..mesh.places import is_point, node_of
 from .item import Item

@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam import Beam, Domain, Layout, RigidBody
-from ..beam.kinematics import direction_weights, probe_reference
+from ..beam import Beam, Domain, Layout, RigidBody, direction_weights, probe_reference
 from ..core import Array
 from ..mesh.places import facets_of
 from .places import Vector, at_node, point

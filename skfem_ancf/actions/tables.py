@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.band import Band, add_multiple, clear, copy, mirror
-from ..beam.strain_energy import (FlatBody, add_eigen_force, add_eigen_tangent,
-                                  put_eigenstrains)
+from ..beam.strain_energy import FlatBody, add_eigen_force, add_eigen_tangent, put_eigenstrains
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import FORCE, JOINTS, MEAN_FORCE, STIFFNESS, call_custom
 from ..core import F1, F2, I1, apart, indices, primitive, source

@@ -89,18 +89,6 @@ class Facets(NamedTuple):
     xi: Array
 
 
-def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float, ...]]:
-    """Facets of a FacetBasis along a beam, and axial coordinates of those across it."""
-    n, ne, find = mesh.p.shape[1], mesh.nelements, np.asarray(basis.find)
-    found = []
-    for side in (BOTTOM, TOP):
-        chosen = np.nonzero((find >= n + side * ne) & (find < n + (side + 1) * ne))[0]
-        if len(chosen):
-            found.append(Facets(side, chosen, find[chosen] - n - side * ne,
-                                np.asarray(basis.X[0]).ravel()))
-    return found, tuple(station_of_node(mesh, int(k)) for k in find[find < n])
-
-
 @dataclass(frozen=True)
 class Distribution:
     """The distribution of a load over a beam, in the reference configuration."""

@@ -11,20 +11,13 @@ from ..core import (Array, gauss_lobatto, hermite_basis, is_builtin, read_only, 
                     require_integer, require_like, require_names, require_option, require_positive)
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.mapping import SECTIONS
-from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, StabilisedMode, require_degree
-
-
-def _chebyshev(n: int) -> Array:
-    """Both ends of the interval, and the zeros of the Chebyshev polynomial T_{n-2}."""
-    m = n - 2  # sines instead of cosines: exactly antisymmetric
-    return np.concatenate([[-1.0], np.sin(np.arange(1 - m, m, 2) * np.pi / (2 * m)), [1.0]])
-
-
-#: Largest degree of a section.
-MAX_ORDER = 64
+from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, require_degree
 
 POINT_FAMILIES = {
-    "chebyshev": _chebyshev,
+    # both ends of the interval, and the zeros of the Chebyshev polynomial T_{n-2}; sines instead of
+    # cosines: exactly antisymmetric
+    "chebyshev": lambda n: np.concatenate([
+        [-1.0], np.sin(np.arange(3 - n, n - 2, 2) * np.pi / (2 * (n - 2))), [1.0]]),
     "gauss-lobatto": gauss_lobatto,
     "equispaced": lambda n: np.linspace(-1.0, 1.0, n),
 }
@@ -60,7 +53,7 @@ class ElementBeamANCF(ElementBeam):
     """
 
     def __init__(self, order: int, points: str = "chebyshev") -> None:
-        n = require_integer("the order of an ANCF beam element", order, 1, MAX_ORDER,
+        n = require_integer("the order of an ANCF beam element", order, 1, 64,
                             "polynomials of a higher degree have no digits left")
         require_option("family of section points", points, POINT_FAMILIES)
         x = np.zeros(1) if n == 1 else (
@@ -211,6 +204,9 @@ class ElementBeamCable(ElementBeam):
     order = 0
     kinematics = "cable"
     carries_shear_parabola = False
+    #: The mode that a higher degree misses in one element is resisted where two meet, and that of
+    #: the cubic axis by a third point.
+    stabilised = ()
 
     def __init__(self, degree: int = 3) -> None:
         m = (require_degree(degree) + 1) // 2
@@ -248,12 +244,6 @@ class ElementBeamCable(ElementBeam):
     @cached_property
     def sampling(self) -> Sampling:
         return Sampling(self.axis_degree - 1, {})
-
-    @property
-    def stabilised(self) -> tuple[StabilisedMode, ...]:
-        # the mode that a higher degree misses in one element is resisted where two meet, and that
-        # of the cubic axis by a third point
-        return ()
 
 
 #: Least order for a field of the section; 0 is the cable.

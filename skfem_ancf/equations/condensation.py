@@ -284,7 +284,7 @@ class _Moves:
         rows = [3 * ends + k for k, ends in enumerate(follow)]
         self._following = first = sum(map(len, follow))
         columns = [np.arange(first)]
-        for k, fixed in enumerate((nodes.fixed_x, nodes.fixed_y, nodes.fixed_angle)):
+        for k, fixed in enumerate(nodes.supported):
             number = np.full(len(nodes.fixed), -1)
             number[nodes.nodes[fixed]] = first + np.arange(len(fixed))
             ends = np.flatnonzero((number[nodes.nodes] >= 0) & ~((k == 2) & nodes.hinged))

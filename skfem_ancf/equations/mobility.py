@@ -205,7 +205,9 @@ def _motions(c, joints):
         if joints.shape[0] > len(frame.equations):
             others = joints[len(frame.equations):] @ motions
             held = sparse.vstack([held, others]) if number > 1 else np.concatenate([held, others])
-        return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
+        return motions, held, lambda: [
+            (f" of the part with line {frame.lines[k]}" if number > 1 else "", origin, c.size)
+            for k in np.unique(parts, return_index=True)[1]]
     values = [member.rigid_motions().copy() for member in c.members]
     for motions, member in zip(values, c.members):
         motions[:, 2] /= member.size

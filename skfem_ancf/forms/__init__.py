@@ -38,7 +38,7 @@ from skfem.element import DiscreteField
 from skfem.helpers import dot
 
 from ..actions.energy import Energy, points_of
-from ..beam import PiolaForm, PiolaTangent, element_dofs, moduli_at, scattered, tensor
+from ..beam import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
 from ..core import (Array, ArrayLike, ask_field, refuse, require_finite, require_like,
                     require_positive)
 from ..formulations import get_formulation
@@ -377,9 +377,7 @@ class StrainEnergy(Energy):
                 weights = beam.across.volume(layer, X, W, every, len(term.section[0]) == 1,
                                              "" if layer.grade is None else "grade")
                 out.append(points_of(
-                    element_dofs(beam, every), np.asarray(mapping.F(X, every)),
-                    np.broadcast_to(weights, (len(every), len(W))),
-                    *beam.element.functions(mapping, X, every),
+                    beam, every, X, np.broadcast_to(weights, (len(every), len(W))),
                     (term.law, mapping.frame(X, every))))
         return out
 

@@ -14,8 +14,6 @@ from .library import values_of
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-PLANES = ("stress", "strain")
-
 
 class Material(Immutable):
     """An isotropic hyperelastic material in plane stress or plane strain.
@@ -60,7 +58,8 @@ class Material(Immutable):
         compared, or a pair for the principal stresses in tension and compression (force per area).
     """
 
-    _title = ""
+    #: The name of :meth:`named`, and that its values are typical; else "".
+    title = ""
 
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
@@ -68,7 +67,7 @@ class Material(Immutable):
         self.E = _number_or_function("E", E)
         self.nu = require_finite_scalar("nu", nu)
         self.density = None if density is None else _number_or_function("density", density)
-        self.plane = require_option("plane", plane, PLANES)
+        self.plane = require_option("plane", plane, ("stress", "strain"))
         refuse(not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")), "nu must lie "
                "in (-1, 0.5), or be 0.5 in plane stress, got {!r} in plane {}", nu, plane)
         self.shear_correction = (
@@ -116,13 +115,8 @@ class Material(Immutable):
         """
         values, title = values_of(name, units)
         made = cls(**{**values, **changes})
-        made._title = title if not changes.keys() & values.keys() else ""
+        vars(made)["title"] = title if not changes.keys() & values.keys() else ""
         return made
-
-    @property
-    def title(self) -> str:
-        """The name of :meth:`named`, and that its values are typical; else ""."""
-        return self._title
 
     @property
     def graded(self) -> bool:
@@ -182,9 +176,30 @@ class Material(Immutable):
         refuse(not self._fits("stress", "energy"), "{} overrides energy and not stress(strain), "
                "its derivative", type(self).__name__)
         law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
-        if not is_builtin(self):
-            _require_derivatives(law, self)
-        return law if k_s == 1.0 else ShearCorrected(law, k_s)
+        corrected = law if k_s == 1.0 else ShearCorrected(law, k_s)
+        if is_builtin(self):
+            return corrected
+        kind = type(self).__name__
+        E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
+        try:
+            stress = along(lambda s: law.stress(E + s * d))
+            energy = along(lambda s: law.energy(E + s * d))
+            D, D0 = (np.asarray(law.moduli(strain)) for strain in (E, 0.0 * E))
+        except NotImplementedError:
+            raise InputError(f"{kind} must define energy(strain) and stress(strain)") from None
+        except TypeError:
+            raise InputError(f"{kind}: the derivative of stress cannot be found by the complex "
+                             "step: define moduli(strain), too") from None
+        for moduli, name in ((D, "moduli(strain)"),
+                             (D.swapaxes(0, 1), "moduli(strain), transposed,")):
+            require_slope(f"{name} of {kind}", "stress(strain)", stress,
+                          np.einsum("ij...,j...->i...", moduli, d))
+        require_slope(f"stress(strain) of {kind}", "energy(strain)", energy,
+                      np.sum(stress[1] * d, axis=0))
+        lowest, *_, highest = np.linalg.eigvalsh(D0.reshape(3, 3, -1)[..., 0])
+        refuse(lowest < -1e-6 * abs(highest), "moduli(strain) of {} at zero strain must not be "
+               "negative, got the eigenvalue {:.6g}", kind, lowest)
+        return corrected
 
     def _require_number(self):
         refuse(callable(self.E), "the modulus E of {!r} varies: use replace(E=number)", self)
@@ -227,13 +242,7 @@ class Material(Immutable):
 
     def moduli(self, strain: Array) -> Array:
         """Derivative of the stress with respect to ``strain``, shape (3, 3, ...)."""
-        strain = np.asarray(strain)
-        out = []
-        for j in range(3):
-            step = np.zeros((3,) + (1,) * (strain.ndim - 1), dtype=complex)
-            step[j] = 1e-30j
-            out.append(np.imag(self.stress(strain + step)) / 1e-30)
-        return np.stack(out, 1)
+        return stress_rates(self.stress, strain)
 
     def thickness_stretch(self, strain: Array) -> Array:
         """Stretch out of the plane, shape (...): 1 in plane strain. Needed for Cauchy stress."""
@@ -261,6 +270,16 @@ def _number_or_function(name, value):
     """Check a positive number, or a function of material coordinates."""
     return value if callable(value) and not isinstance(value, type) else require_positive(
         name, value)
+
+
+def stress_rates(stress: Callable[[Array], Array], strain: Array) -> Array:
+    """Derivative (3, 3, ...) of a stress (3, ...) by the strain (3, ...), by complex steps."""
+    strain, out = np.asarray(strain), []
+    for j in range(3):
+        step = np.zeros((3,) + (1,) * (strain.ndim - 1), dtype=complex)
+        step[j] = 1e-30j
+        out.append(np.imag(stress(strain + step)) / 1e-30)
+    return np.stack(out, 1)
 
 
 def hooke(E: float, nu: float, plane: str) -> Array:
@@ -292,28 +311,6 @@ class ShearCorrected:
     def moduli(self, strain: Array) -> Array:
         D = self.base.moduli(self._scaled(strain))
         return D * np.outer(self.scale, self.scale).reshape((3, 3) + (1,) * (D.ndim - 2))
-
-
-def _require_derivatives(law, material):
-    E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
-    try:
-        stress, energy = (along(lambda s, of=of: of(E + s * d)) for of in (law.stress, law.energy))
-        D, D0 = (np.asarray(law.moduli(strain)) for strain in (E, 0.0 * E))
-    except NotImplementedError:
-        raise InputError(f"{type(material).__name__} must define energy(strain) and "
-                         "stress(strain)") from None
-    except TypeError:
-        raise InputError(f"{type(material).__name__}: the derivative of stress cannot be found by "
-                         "the complex step: define moduli(strain), too") from None
-    kind = type(material).__name__
-    for moduli, name in ((D, "moduli(strain)"), (D.swapaxes(0, 1), "moduli(strain), transposed,")):
-        require_slope(f"{name} of {kind}", "stress(strain)", stress,
-                      np.einsum("ij...,j...->i...", moduli, d))
-    require_slope(f"stress(strain) of {kind}", "energy(strain)", energy,
-                  np.sum(stress[1] * d, axis=0))
-    lowest, *_, highest = np.linalg.eigvalsh(D0.reshape(3, 3, -1)[..., 0])
-    refuse(lowest < -1e-6 * abs(highest), "moduli(strain) of {} at zero strain must not be "
-           "negative, got the eigenvalue {:.6g}", type(material).__name__, lowest)
 
 
 class OverriddenLaw:

@@ -1,20 +1,266 @@
-"""Von Mises plasticity with isotropic and kinematic hardening."""
+"""Von Mises plasticity with isotropic and kinematic hardening.
+
+At points, in NumPy and compiled, an elastic trial stress returns to the yield surface by backward
+Euler. Arguments are those of :class:`~skfem_ancf.materials.history.HistoryMaterial`: ``constants``
+have the order of the names below, history variables in the order plastic strain (xx, yy, 2 xy),
+back stress (xx, yy, xy), accumulated plastic strain p. ``f`` is sqrt(2/3) times the von Mises
+stress. In components x whose moduli are diagonal, it is ``f^2 = sum P x^2``, and a plastic
+multiplier g makes the trial stress ``x / (1 + A g)``. One search finds g for plane stress, where
+there are three components (Simo, Hughes: "Computational inelasticity" (1998), box 3.3), and for
+plane strain and fibres, where there is one.
+"""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core import (Array, ArrayLike, Immutable, refuse, require_finite, require_not_negative,
-                    require_positive)
+from ..core import (Array, ArrayLike, Immutable, everywhere, refuse, require_finite,
+                    require_not_negative, require_positive, somewhere, source, where)
 from .history import ACROSS, HistoryMaterial
 from .library import values_of
-from .return_mapping import (fibre, fibre_energy, hardened, plane_strain, plane_strain_energy,
-                             plane_strain_fibre, plane_strain_fibre_energy, plane_stress,
-                             plane_stress_energy)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+#: Places of the constants. From ROWS on there is p, yield stress, slope and stored energy for each
+#: row of a table of hardening but the first.
+E, NU, KINEMATIC, YIELD, SATURATION, RATE, LINEAR, ROWS = range(8)
+#: Newton corrections of a return to the yield surface; the gap at the end over the yield stress, or
+#: over the trial stress, whose round-off it has.
+CORRECTIONS, FEW, CLOSED, ROUGH = 100, 10, 1e-13, 1e-14
+#: f of the yield stress 1.
+ROOT = np.sqrt(2.0 / 3.0)
+HALF = np.sqrt(0.5)
+
+
+@source
+def hardened(c, p):
+    """The yield stress at an accumulated plastic strain, and its slope."""
+    y, K = c[YIELD] + c[LINEAR] * p, c[LINEAR] + 0.0 * p
+    if c[SATURATION] > 0.0:
+        rest = c[SATURATION] * np.exp(-c[RATE] * p)
+        y, K = y + c[SATURATION] - rest, K + c[RATE] * rest
+    for k in range(ROWS, len(c), 4):
+        over = p >= c[k]
+        y, K = where(over, c[k + 1] + c[k + 2] * (p - c[k]), y), where(over, c[k + 2], K)
+    return y, K
+
+
+@source
+def locked(c, history):
+    """Energy that hardening stores: that of the yield stress beyond the first, and kinematic."""
+    p, a, b, d = history[6], history[0], history[1], history[2]
+    out = 0.5 * c[LINEAR] * p * p
+    if c[SATURATION] > 0.0 and c[RATE] > 0.0:
+        out = out + c[SATURATION] * (p + np.expm1(-c[RATE] * p) / c[RATE])
+    for k in range(ROWS, len(c), 4):
+        over = p - c[k]
+        out = where(over >= 0.0, c[k + 3] + over * (
+            c[k + 1] - c[YIELD] + 0.5 * c[k + 2] * over), out)
+    return out + c[KINEMATIC] / 3.0 * (a * a + b * b + 0.5 * d * d + (a + b) * (a + b))
+
+
+@source
+def yields(c, square, p):
+    """True where the square of f is beyond the yield stress."""
+    y = ROOT * (1.0 + 1e-12) * hardened(c, p)[0]  # what is beyond by less is round-off
+    return square > y * y
+
+
+@source
+def multiplier(c, plastic, squares, A, p):
+    """Plastic multiplier g (0 where nothing yields), f, and the slope of the yield stress;
+    ``squares`` are those of the components, which sum up to f^2."""
+    # The ratio of yield stress and stress is nearly linear in g. The start is exact for one
+    # component and linear hardening. After some corrections bounds hold them.
+    f = 0.0 * p
+    for x in squares:
+        f = f + x
+    y, K = hardened(c, p)
+    y = ROOT * y
+    f = where(plastic, np.sqrt(f), y)
+    g = (f - y) / (y * max(A) + 2.0 / 3.0 * K * f)
+    size, low, high = f / ROOT, 0.0 * f, f / (ROOT * c[YIELD] * min(A))
+    closed = np.maximum(CLOSED * c[YIELD], ROUGH * size)
+    for k in range(CORRECTIONS):
+        square, slope = 0.0 * p, 0.0 * p
+        for i in range(len(A)):
+            part = 1.0 / (1.0 + A[i] * g)
+            x = squares[i] * part * part
+            square, slope = square + x, slope + A[i] * part * x
+        f = where(plastic, np.sqrt(square), size)
+        y, K = hardened(c, p + ROOT * g * f)
+        ratio = ROOT * y / f
+        value = where(plastic, size * (1.0 - ratio), 0.0)
+        if everywhere(np.abs(value) <= closed):
+            break
+        slope = slope / (f * f)  # of minus log f
+        better = g + value / (size * (ratio * slope + 2.0 / 3.0 * K * (1.0 - g * slope)))
+        if k < FEW:
+            g = np.maximum(better, 0.0)
+        else:
+            low, high = where(value > 0.0, g, low), where(value < 0.0, g, high)
+            g = where((better > low) & (better < high), better, 0.5 * (low + high))
+    return g, f, K
+
+
+@source
+def plane_stress(c, strain, history, dt, S, D, after):
+    """Stress, moduli and history of plane stress."""
+    # x, y, z are the trial stress less back stress in the components (xx + yy, xx - yy, xy) over
+    # sqrt(2), sqrt(2), 1, in which the moduli are diagonal.
+    G, H, p = 0.5 * c[E] / (1.0 + c[NU]), 2.0 / 3.0 * c[KINEMATIC], history[6]
+    X, Y, Z = c[E] / (1.0 - c[NU]), 2.0 * G, G
+    a, b = strain[0] - history[0], strain[1] - history[1]
+    x = HALF * (X * (a + b) - history[3] - history[4])
+    y = HALF * (Y * (a - b) - history[3] + history[4])
+    z = Z * (strain[2] - history[2]) - history[5]
+    for k in range(len(history)):
+        after[k] = history[k]
+    plastic = yields(c, x * x / 3.0 + y * y + 2.0 * z * z, p)
+    if somewhere(plastic):
+        A, B, C = X / 3.0 + H, Y + H, 2.0 * Z + H
+        g, f, K = multiplier(c, plastic, (x * x / 3.0, y * y, 2.0 * z * z), (A, B, C), p)
+        x, y, z = x / (1.0 + A * g), y / (1.0 + B * g), z / (1.0 + C * g)
+        q, r = HALF * g * x, HALF * g * y
+        after[0] += q / 3.0 + r
+        after[1] += q / 3.0 - r
+        after[2] += 2.0 * g * z
+        after[3] += H * (q + r)
+        after[4] += H * (q - r)
+        after[5] += H * g * z
+        after[6] += ROOT * g * f
+        one, two = 1.0 + H * g, 1.0 - 2.0 / 3.0 * K * g
+        h = g / one
+        u, v, w = X / (1.0 + X / 3.0 * h), Y / (1.0 + Y * h), Z / (1.0 + 2.0 * Z * h)
+        a, b, d = u * x / 3.0, v * y, 2.0 * w * z
+        share = x * a / 3.0 + y * b + 2.0 * z * d + 2.0 / 3.0 * one / two * (
+            K * one + c[KINEMATIC] * two) * f * f
+        share = where(plastic, 1.0, 0.0) / where(plastic, share, 1.0)
+        q, r, n = u - share * a * a, v - share * b * b, share * a * b
+        D[0], D[1], D[3] = 0.5 * (q + r) - n, 0.5 * (q - r), 0.5 * (q + r) + n
+        n = HALF * share * d
+        D[2], D[4], D[5] = -n * (a + b), -n * (a - b), w - share * d * d
+    else:
+        D[0], D[1], D[3] = 0.5 * (X + Y), 0.5 * (X - Y), 0.5 * (X + Y)
+        D[2], D[4], D[5] = 0.0, 0.0, Z
+    S[0], S[1], S[2] = HALF * (x + y) + after[3], HALF * (x - y) + after[4], z + after[5]
+
+
+@source
+def plane_stress_energy(c, strain, history):
+    """Stored energy of plane stress."""
+    a, b, d = strain[0] - history[0], strain[1] - history[1], strain[2] - history[2]
+    return 0.5 * c[E] / (1.0 + c[NU]) * (
+        (a * a + b * b + 2.0 * c[NU] * a * b) / (1.0 - c[NU]) + 0.5 * d * d) + locked(c, history)
+
+
+@source
+def deviators(c, strain, history):
+    """Volumetric strain, and elastic stress deviators xx, yy, xy and zz of plane strain."""
+    a, b, z = strain[0] - history[0], strain[1] - history[1], history[0] + history[1]
+    G, mean = 0.5 * c[E] / (1.0 + c[NU]), (a + b + z) / 3.0
+    return 3.0 * mean, 2.0 * G * (a - mean), 2.0 * G * (b - mean), G * (
+        strain[2] - history[2]), 2.0 * G * (z - mean)
+
+
+@source
+def plane_strain(c, strain, history, dt, S, D, after):
+    """Stress, moduli and history of plane strain: radial return."""
+    G, bulk, H = 0.5 * c[E] / (1.0 + c[NU]), c[E] / (3.0 - 6.0 * c[NU]), 2.0 / 3.0 * c[KINEMATIC]
+    volume, x, y, s, z = deviators(c, strain, history)
+    x, y, s, z = x - history[3], y - history[4], s - history[5], z + history[3] + history[4]
+    square = x * x + y * y + 2.0 * s * s + z * z
+    for k in range(len(history)):
+        after[k] = history[k]
+    one, n = 1.0 + 0.0 * square, 0.0 * square
+    plastic = yields(c, square, history[6])
+    if somewhere(plastic):
+        A = 2.0 * G + H
+        g, f, K = multiplier(c, plastic, (square,), (A,), history[6])
+        after[6] += ROOT * g * f
+        g = g / (1.0 + A * g)  # flow is this times the trial stress
+        after[0] += g * x
+        after[1] += g * y
+        after[2] += 2.0 * g * s
+        after[3] += H * g * x
+        after[4] += H * g * y
+        after[5] += H * g * s
+        one = 1.0 - 2.0 * G * g
+        n = where(plastic, one - 1.0 + 1.0 / (1.0 + (K + c[KINEMATIC]) / (3.0 * G)), 0.0)
+        n *= 2.0 * G / where(plastic, square, 1.0)
+    S[0] = bulk * volume + history[3] + one * x
+    S[1] = bulk * volume + history[4] + one * y
+    S[2] = history[5] + one * s
+    a, b = bulk + 4.0 / 3.0 * G * one, bulk - 2.0 / 3.0 * G * one
+    D[0], D[1], D[2] = a - n * x * x, b - n * x * y, -n * x * s
+    D[3], D[4], D[5] = a - n * y * y, -n * y * s, G * one - n * s * s
+
+
+@source
+def plane_strain_energy(c, strain, history):
+    """Stored energy of plane strain."""
+    volume, x, y, s, z = deviators(c, strain, history)
+    return 0.5 * c[E] / (3.0 - 6.0 * c[NU]) * volume * volume + 0.5 * (1.0 + c[NU]) / c[E] * (
+        x * x + y * y + 2.0 * s * s + z * z) + locked(c, history)
+
+
+@source
+def fibre(c, strain, history, dt, S, D, after):
+    """Stress, modulus and history of a fibre in uniaxial stress."""
+    H, x = c[KINEMATIC], c[E] * (strain[0] - history[0]) - history[3]
+    square = 2.0 / 3.0 * x * x
+    for k in range(len(history)):
+        after[k] = history[k]
+    plastic = yields(c, square, history[6])
+    if somewhere(plastic):
+        A = 2.0 / 3.0 * (c[E] + H)
+        g, _, K = multiplier(c, plastic, (square,), (A,), history[6])
+        flow = 2.0 / 3.0 * g / (1.0 + A * g) * x
+        after[0] += flow
+        after[1] -= 0.5 * flow
+        after[3] += H * flow
+        after[6] += np.abs(flow)
+        D[0] = where(plastic, c[E] * (K + H) / (c[E] + K + H), c[E])
+    else:
+        D[0] = c[E]
+    S[0] = c[E] * (strain[0] - after[0])
+
+
+@source
+def fibre_energy(c, strain, history):
+    """Stored energy of a fibre."""
+    elastic = strain[0] - history[0]
+    return 0.5 * c[E] * elastic * elastic + locked(c, history)
+
+
+@source
+def across_width(history):
+    """A history with zz in place of yy, as :func:`plane_stress` has it: plastic strains have no
+    trace, and of the back stress that of yy is zero, as stress is."""
+    a, b = history[0], history[3] - history[4]
+    return a, -a - history[1], 0.0 * a, b, -history[3] - 2.0 * history[4], 0.0 * b, history[6]
+
+
+@source
+def plane_strain_fibre(c, strain, history, dt, S, D, after):
+    """Stress, modulus and history of a fibre in plane strain: :func:`plane_stress` of its length
+    and the width, in which it has no strain."""
+    e, size = strain[0], strain.shape[1:]
+    stress, moduli = np.empty((3, *size)), np.empty((6, *size))
+    plane_stress(c, (e, 0.0 * e, 0.0 * e), across_width(history), dt, stress, moduli, after)
+    S[0], D[0] = stress[0], moduli[0]
+    after[1], after[4] = -after[0] - after[1], -(after[3] + after[4]) / 3.0
+    after[3] += after[4]
+
+
+@source
+def plane_strain_fibre_energy(c, strain, history):
+    """Stored energy of a fibre in plane strain."""
+    e = strain[0]
+    return plane_stress_energy(c, (e, 0.0 * e, 0.0 * e), across_width(history))
+
 
 #: Functions of a point and of a fibre, with their stored energies.
 FUNCTIONS = {"stress": (plane_stress, plane_stress_energy, fibre, fibre_energy),
@@ -122,7 +368,20 @@ class ElasticPlastic(HistoryMaterial):
         refuse(self.nu == 0.5, "ElasticPlastic needs nu below 0.5, got 0.5: use 0.49")
         self.yield_stress = require_positive("yield_stress", yield_stress)
         self.kinematic = require_not_negative("kinematic", kinematic, False)
-        self.hardening = self._checked(hardening)
+        refuse(isinstance(hardening, str), "hardening is a number, a table (n, 2) or "
+               "Voce(saturation, rate), got {!r}", hardening)
+        if isinstance(hardening, Voce):
+            self.hardening: Any = hardening
+        elif np.ndim(hardening) == 0:
+            self.hardening = require_not_negative("hardening", hardening, False)
+        else:
+            self.hardening = table = require_finite("hardening", hardening, (None, 2))
+            rise, wrong = np.diff(table, axis=0), len(table) < 2 or table[0, 0] != 0.0
+            refuse(wrong or np.any(rise[:, 0] <= 0.0) or np.any(rise[:, 1] < 0.0) or abs(
+                table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress,
+                "hardening as a table has rows (plastic strain, yield stress), strains increasing "
+                "from 0, stresses not decreasing from yield_stress = {:g}; got {!r}",
+                self.yield_stress, table)
 
     @classmethod
     def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> "Self":
@@ -137,21 +396,6 @@ class ElasticPlastic(HistoryMaterial):
         strength = values_of(name, units)[0]["strength"]
         return super().named(name, units, **{"yield_stress": strength, **changes})
 
-    def _checked(self, hardening):
-        if isinstance(hardening, Voce):
-            return hardening
-        refuse(isinstance(hardening, str), "hardening is a number, a table (n, 2) or "
-               "Voce(saturation, rate), got {!r}", hardening)
-        if np.ndim(hardening) == 0:
-            return require_not_negative("hardening", hardening, False)
-        table = require_finite("hardening", hardening, (None, 2))
-        rise = np.diff(table, axis=0)
-        refuse(len(table) < 2 or table[0, 0] != 0.0 or np.any(rise[:, 0] <= 0.0) or np.any(
-            rise[:, 1] < 0.0) or abs(table[0, 1] - self.yield_stress) > 1e-9 * self.yield_stress,
-            "hardening as a table has rows (plastic strain, yield stress), strains increasing from "
-            "0, stresses not decreasing from yield_stress = {:g}; got {!r}", self.yield_stress,
-            table)
-        return table
 
     def __repr__(self) -> str:
         return super().__repr__()[:-1] + f", yield_stress={self.yield_stress:g})"
@@ -164,7 +408,7 @@ class ElasticPlastic(HistoryMaterial):
 
     @property
     def constants(self) -> Array:
-        """Those of the functions below; a table is linear from its first row on."""
+        """Those of the functions above; a table is linear from its first row on."""
         h, rows = self.hardening, np.zeros((0, 4))
         if not isinstance(h, Voce | float):
             (p, y), step = h.T, np.diff(h, axis=0)

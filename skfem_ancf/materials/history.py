@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import (Array, ConvergenceError, InputError, Law, ask, rebuilt, refuse, require_integer,
                     require_positive, require_slope)
-from .base import LinearLaw, Material, hooke
+from .base import LinearLaw, Material, hooke, stress_rates
 from .pointwise import MODULI, python
 
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle
@@ -16,18 +16,14 @@ ACROSS = 14
 #: Newton corrections of the lateral strain of a fibre; lateral stress over the largest that is
 #: left, and that which may be if it does not decrease.
 LATERAL, CLOSE, ROUGH = 50, 1e-13, 1e-8
-#: Step of derivatives, strain and time at which those of a user-defined law are tested.
-TINY, SMALL, SPAN = 1e-30, 1e-3, 1.0
+#: Strain and time at which derivatives of a user-defined law are tested.
+SMALL, SPAN = 1e-3, 1.0
 
 
 #: Names of the functions of a point and of a fibre, and of the methods that they stand for.
 POINT = "point", "stored", "evaluate", "stress", "moduli", "energy"
 FIBRE = "fibre", "fibre_stored", "axial", "axial_energy"
 NO_VARIABLES: Mapping[str, int] = {}
-
-
-def real(x: Any) -> Array:
-    return np.asarray(x, dtype=float)
 
 
 class AtRest(LinearLaw):
@@ -168,24 +164,19 @@ class HistoryMaterial(Material):
         Iterations take it as symmetric."""
         if self.point is not None:
             return self.evaluate(strain, history, dt)[1]
-        out = []
-        for j in range(3):
-            step = np.zeros((3,) + (1,) * (np.ndim(strain) - 1), dtype=complex)
-            step[j] = 1j * TINY
-            out.append(np.imag(self.stress(strain + step, history, dt)[0]) / TINY)
-        return np.stack(out, 1)
+        return stress_rates(lambda E: self.stress(E, history, dt)[0], strain)
 
     def evaluate(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
         """Stress, moduli and history; to be overridden where they are found together."""
         if self.point is not None:
-            S, D, after = self._at_points(self.point, real(strain), real(history), dt)
+            S, D, after = self._at_points(self.point, strain, history, dt)
             return S, D[list(MODULI)].reshape(3, *S.shape), after
         S, after = self.stress(strain, history, dt)
         return S, self.moduli(strain, history, dt), after
 
     def _at_points(self, function, strain, history, dt):
         """Stress, moduli and history of a function of a point, in NumPy."""
-        n = len(strain)
+        strain, history, n = np.asarray(strain, float), np.asarray(history, float), len(strain)
         S, D = np.empty(strain.shape), np.empty((n * (n + 1) // 2, *strain.shape[1:]))
         after = np.empty((self.number, *strain.shape[1:]))
         python(function)(self.constants, strain, history, dt, S, D, after)
@@ -215,7 +206,7 @@ class HistoryMaterial(Material):
         (...) is that along the fibre. By default the lateral strain is found by Newton's method;
         ConvergenceError if it is not found, upon which solvers cut their step."""
         if self.fibre is not None:
-            S, D, after = self._at_points(self.fibre, real(strain)[None], real(history), dt)
+            S, D, after = self._at_points(self.fibre, np.asarray(strain)[None], history, dt)
             return S[0], D[0], after
         E = np.zeros((3, *np.shape(strain)))
         E[0], E[1] = strain, -self.lateral_ratio * strain

@@ -91,10 +91,6 @@ class PointwiseMaterial(Material):
         return out
 
 
-#: Stiffness of the thickness over E.
-THICKNESS = 1e4
-
-
 @source
 def plane_sections(constants, xx, yy, xy):
     """W = E/2 (a - 1)^2 + G/2 g^2 + K/2 eps_yy^2 and its derivatives."""
@@ -127,19 +123,16 @@ class PlaneSections(PointwiseMaterial):
     point = staticmethod(plane_sections)
     #: Hooke's law for the small strains of a cable.
     is_hooke = True
+    G = 0.0
 
     def __init__(self, E: float, shear: float, density: float | None = None) -> None:
         super().__init__(E, 0.0, density)
-        self.shear = shear
-
-    @property
-    def G(self) -> float:
-        return self.shear
+        self.G = shear
 
     @property
     def constants(self) -> Array:
         """E, the shear modulus, and the stiffness of the thickness."""
-        return np.array([self.E, self.shear, THICKNESS * self.E])
+        return np.array([self.E, self.G, 1e4 * self.E])
 
     def shear_factor(self, element: Any) -> float:
         return 1.0

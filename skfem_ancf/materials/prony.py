@@ -32,14 +32,6 @@ def relax(c, history, dt, S, after):
 
 
 @source
-def product(D, x, out):
-    """The product of a symmetric matrix D (6,) and x (3, ...)."""
-    out[0] = D[0] * x[0] + D[1] * x[1] + D[2] * x[2]
-    out[1] = D[1] * x[0] + D[3] * x[1] + D[4] * x[2]
-    out[2] = D[2] * x[0] + D[4] * x[1] + D[5] * x[2]
-
-
-@source
 def square(D, x, y, z):
     """The square of a vector by a symmetric matrix D (6,)."""
     return D[0] * x * x + D[3] * y * y + D[5] * z * z + 2.0 * (
@@ -49,10 +41,13 @@ def square(D, x, y, z):
 @source
 def relaxing(c, strain, history, dt, S, D, after):
     """Stress, moduli and history at a point."""
-    product(c[MODULI:], strain, S)
+    M, x, y, z = c[MODULI:], strain[0], strain[1], strain[2]
+    S[0] = M[0] * x + M[1] * y + M[2] * z
+    S[1] = M[1] * x + M[3] * y + M[4] * z
+    S[2] = M[2] * x + M[4] * y + M[5] * z
     part = relax(c, history, dt, S, after)
     for k in range(6):
-        D[k] = part * c[MODULI + k]
+        D[k] = part * M[k]
 
 
 @source

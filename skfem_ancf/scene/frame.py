@@ -348,8 +348,7 @@ class Frame(Scene):
             fixed[nodes, COMPONENTS.index(name)] = True
         if "angle" in names:
             self._require_rigid(nodes, "it has no rotation to hold, pin it")
-        now = settlements or known.settlements
-        self._take(known._with(fixed=fixed, settlements=now, functions=now.functions))
+        self._take(known._with(fixed=fixed, settlements=settlements or known.settlements))
         return self
 
     def settle(self, place: Any, x: float | Callable[[float], float] | None = None,

@@ -127,9 +127,6 @@ POINTS = 4
 #: Tolerance of interfaces, relative to the height.
 EDGE = 1e-12
 
-#: Degree in the height of the interpolated shear factor of a tapered section.
-HEIGHTS = 7
-
 #: Functions of a layer and their names in messages.
 NAMES = {"width": "width", "grade": "E", "density": "density"}
 
@@ -442,7 +439,7 @@ class Across(Immutable):
         high = self.mesh.height
         low = min(float(np.min(heights)), (1.0 - 1e-6) * high)
         factor, GA = (chebinterpolate(np.vectorize(partial(
-            lambda z, k: at(low + (high - low) * (z + 1.0) / 2.0)[k], k=k)), HEIGHTS)
+            lambda z, k: at(low + (high - low) * (z + 1.0) / 2.0)[k], k=k)), 7)
             for k in range(2))
         x, w = gauss(POINTS)
         z = np.clip(2.0 * (self.heights(x) - low) / (high - low) - 1.0, -1.0, 1.0)

@@ -84,12 +84,9 @@ def _box(h, b, t, outer, inner):
             _side((0, t, 0), (x, t, inner), (x, y, inner), (0, y, 0)))
 
 
-def _rows(text):
-    return {row.split()[0]: tuple(map(float, row.split()[1:])) for row in text.split(";")}
-
-
-def _found(series, number, rows):
-    rows = {f"{series} {one}": row for one, row in rows.items()}
+def _found(series, number, text):
+    rows = {f"{series} {one}": tuple(map(float, row))
+            for one, *row in map(str.split, text.split(";"))}
     return rows[require_option("profile", f"{series} {number}", rows)]
 
 
@@ -101,19 +98,19 @@ def shape_of(name: str) -> Shape:
     number = re.sub(r"[\s×X*]+", "x", match.group(2).replace(",", ".")) if match else ""
     solid: Any = _side((0, 0, 0), (0, 0, 0))
     if series in ("HEA", "HEB", "IPE"):
-        h, b, tw, tf, r = _found(series, number, _rows(I_SHAPES[series]))
+        h, b, tw, tf, r = _found(series, number, I_SHAPES[series])
         b, tw = 0.5 * b, 0.5 * tw
         return h, 2.0, _side((0, 0, 0), (b, 0, 0), (b, tf, 0), (tw, tf, r), (tw, h - tf, r),
                              (b, h - tf, 0), (b, h, 0)), solid
     if series == "UPN":
-        h, b, tw, tf, r1, r2 = _found(series, number, _rows(U_SHAPES))
+        h, b, tw, tf, r1, r2 = _found(series, number, U_SHAPES)
         # where the flange has its nominal thickness
         slope, at = (U_SLOPE, 0.5 * b) if h <= 300 else (LOW_U_SLOPE, 0.5 * (b + tw))
         tip, root = tf + slope * (at - b), tf + slope * (at - tw)
         return h, 1.0, _side((0, 0, 0), (b, 0, 0), (b, tip, r2), (tw, root, r1),
                              (tw, h - root, r1), (b, h - tip, r2), (b, h, 0)), solid
     if series == "T":  # flange at the top; it and the web are t thick in their middle
-        t, = _found(series, number, _rows(T_SHAPES))
+        t, = _found(series, number, T_SHAPES)
         h, s, b = float(number), T_SLOPE, 0.5 * float(number)
         x = (0.5 * t + s * (0.5 * h - t - 0.5 * s * b)) / (1.0 - s * s)
         under, out = h - t - s * (0.5 * b - x), h - t + 0.5 * s * b
@@ -121,7 +118,7 @@ def shape_of(name: str) -> Shape:
                              (b, out, 0.5 * t), (b, h, 0)), solid
     sizes = [float(x) for x in number.split("x")] if number else []
     if series == "L" and len(sizes) in (2, 3) and sizes[0] == sizes[-2]:
-        r, = _found(series, f"{sizes[0]:g}x{sizes[-1]:g}", _rows(L_SHAPES))
+        r, = _found(series, f"{sizes[0]:g}x{sizes[-1]:g}", L_SHAPES)
         a, t = sizes[0], sizes[-1]
         return a, 1.0, _side((0, 0, 0), (a, 0, 0), (a, t, 0.5 * r), (t, t, r), (t, a, 0.5 * r),
                              (0, a, 0)), solid

@@ -22,9 +22,6 @@ from .library import pieces_of
 #: Additional points where the width is not a polynomial of Y.
 MORE = 4
 
-#: Points across a layer for mean values.
-MEAN = 8
-
 
 class Piece(NamedTuple):
     """An interval with smooth width, a number or a function of eta (n,); at its ends maybe a square
@@ -77,7 +74,7 @@ class Measure(Immutable):
         """A function of the layer at points, or with ``whole`` its means over the sections."""
         if not whole:
             return at.evaluated(name)
-        X, (eta, w) = at.X, self.gauss(MEAN)
+        X, (eta, w) = at.X, self.gauss(8)
         points = np.array([np.repeat(X[0][..., None], len(eta), -1),
                            np.broadcast_to(eta, X[0].shape + eta.shape)])
         values = at.moved(points.reshape(X.shape[:-1] + (-1,))).evaluated(name)

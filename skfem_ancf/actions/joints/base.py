@@ -1,7 +1,6 @@
 """Base class of joints: constraint equations on points and sections; parts of joints."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,10 +8,9 @@ import numpy as np
 from ...beam import Layout, RigidBody
 from ...core import Array, ArrayLike, InputError, explained, is_builtin, require_finite, shown
 from ...mesh.places import is_point
-from ..bound import (BoundConstraint, at_generic_displacements, require_derivatives,
-                     require_entries, user_parts)
+from ..bound import BoundConstraint, require_derivatives, require_entries, user_parts
 from ..item import Item
-from ..places import Vector, products
+from ..places import Vector, dense_entries
 
 
 def rotation(angle: float) -> Array:
@@ -86,8 +84,7 @@ class Joint(BoundConstraint, Item):
             if second is not None:
                 i, j, values = second
                 require_entries(f"curvature of {bound!r}", i, j, values, n)
-            at_generic_displacements(partial(require_derivatives, bound, layout.sizes),
-                                     layout.sizes)
+            require_derivatives(bound, layout.sizes)
             return [bound, *user_parts(bound, layout)]
 
     def __repr__(self) -> str:
@@ -96,12 +93,6 @@ class Joint(BoundConstraint, Item):
             at = at[0]  # given once for all
         parts = [type(self).__name__, self.name, None if at is None else f"at {shown(at)}"]
         return f"<{' '.join(part for part in parts if part)}>"
-
-
-def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
-    """Names of the equations between the first of n beams and each of the others."""
-    return tuple(names) if n == 2 else tuple(
-        f"{name}, from number {k}" for k in range(1, n) for name in names)
 
 
 def angle_to(d: ArrayLike, e: ArrayLike) -> float:
@@ -140,9 +131,10 @@ class Equation:
             none = np.zeros(0, dtype=int)
             return none, none, np.zeros(0)
         d, e, M = self.product
+        rows, columns, values = dense_entries(d.dofs, e.dofs, np.einsum(
+            "ij,ik,jl->ikjl", factor * (M + M.T if d is e else M), d.weights, e.weights))
         if d is e:
-            return products(d, d, factor * (M + M.T))
-        rows, columns, values = products(d, e, factor * M)
+            return rows, columns, values
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
 
 
@@ -205,11 +197,13 @@ class UnitDirector(ComposedJoint):
 class IndependentPart(Joint):
     """The independent equations of a bound joint, by increasing numbers."""
 
+    turning = False
+
     def __init__(self, joint: Joint, kept: Array) -> None:
         self.joint, self.kept = joint, kept
         self.equations = tuple(joint.equations[k] for k in kept)
         self.constant, self.moving, self.name = joint.constant, joint.moving, joint.name
-        self.tabled = joint.tabled and is_builtin(joint)
+        self.tabled, self.turning = joint.tabled and is_builtin(joint), joint.turning
         self._number = np.full(len(joint.equations), -1)
         self._number[kept] = np.arange(len(kept))
         self._freeze()
@@ -222,9 +216,6 @@ class IndependentPart(Joint):
         keep = rows >= 0
         return (rows[keep], *(x[..., keep] for x in others))
 
-    def _all(self, multipliers: Array) -> Array:
-        return np.bincount(self.kept, multipliers, len(self._number))
-
     def value(self, u: Array, t: float) -> Array:
         return np.asarray(self.joint.value(u, t))[self.kept]
 
@@ -233,21 +224,19 @@ class IndependentPart(Joint):
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
-        return self.joint.curvature(u, t, self._all(multipliers))
+        return self.joint.curvature(u, t, np.bincount(self.kept, multipliers, len(self._number)))
 
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.mean_entries(u0, u1, t))
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
-        return self.joint.mean_turning(u0, u1, v0, v1, t, self._all(multipliers))
+        return self.joint.mean_turning(u0, u1, v0, v1, t, np.bincount(
+            self.kept, multipliers, len(self._number)))
 
     def lost(self, u: Array) -> str:
         return self.joint.lost(u)
 
-    @property
-    def turning(self) -> bool:
-        return self.joint.turning
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.slope_entries(times, N))

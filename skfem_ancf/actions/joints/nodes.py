@@ -1,16 +1,13 @@
 """The nodes of a frame: connections between the ends of its lines, and settlements."""
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
-from ...beam import Beam, Layout
-from ...beam.kinematics import direction
-from ...core import Array, MeshError, sample
+from ...beam import Beam, Layout, direction
+from ...core import Array, MeshError, cached_property, sample
 from ...mesh.frame_graph import FrameGraph
 from ..places import Vector
 from ..symbols import Symbol, support
@@ -28,7 +25,9 @@ class Settlements:
 
     def __init__(self, numbers: Array, of: dict[tuple[int, int], Any] | None = None) -> None:
         self.numbers, self.of = numbers, of or {}
-        self.functions = tuple(self.of.values())
+        #: whether nodes move along x and y and rotate
+        self.moves = [bool(np.any(numbers[:, k])) or any(at == k for _, at in self.of)
+                      for k in range(len(COMPONENTS))]
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> "Settlements":
         """A copy with nodes displaced by a number or a function of time."""
@@ -40,9 +39,6 @@ class Settlements:
                 of[node, k] = by
         return Settlements(numbers, of)
 
-    def moves(self, k: int) -> bool:
-        return bool(np.any(self.numbers[:, k])) or any(at == k for _, at in self.of)
-
     def by(self, nodes: Array, k: int, times: Array) -> Array:
         """Displacements of nodes at some times, shape (n, m)."""
         out = np.multiply.outer(times, self.numbers[nodes, k])
@@ -52,7 +48,8 @@ class Settlements:
         return out
 
 
-FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
+#: Names of equations, of followers and of supports.
+EQUATIONS = "force along x", "force along y", "moment"
 
 
 class Nodes(Joint):
@@ -76,8 +73,6 @@ class Nodes(Joint):
                  ) -> None:
         self.nodes, self.hinged, self.fixed = nodes, hinged, fixed
         self.settlements = Settlements(np.zeros(fixed.shape))
-        #: functions of time of these
-        self.functions = self.settlements.functions
         self.graph, self.lines = graph, lines
         # rigid ends come before hinged ones: the first of each node is its leader
         order = np.lexsort((np.arange(len(nodes)), hinged, nodes))
@@ -93,15 +88,15 @@ class Nodes(Joint):
 
     @property
     def moving(self) -> bool:  # type: ignore[override]
-        return any(self.settlements.moves(k) for k in range(len(COMPONENTS)))
+        return any(self.settlements.moves)
 
     @property
     def turning(self) -> bool:
-        return self.settlements.moves(COMPONENTS.index("angle"))
+        return self.settlements.moves[2]
 
     def _shifts(self, times: Array) -> list[Array]:
-        ends = self.fixed_x, self.fixed_y, self.fixed_angle
-        return [self.settlements.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
+        return [self.settlements.by(self.nodes[at], k, times)
+                for k, at in enumerate(self.supported)]
 
     def leading(self, nodes: Array) -> Array:
         """Leading ends of nodes, shape (k,)."""
@@ -122,13 +117,11 @@ class Nodes(Joint):
         return out
 
     def bind(self, layout: Layout) -> None:
-        self.fixed_x, self.fixed_y, self.fixed_angle = (
-            self.leaders[self.fixed[self.nodes[self.leaders], k]] for k in range(3))
-        self.fixed_angle = self.fixed_angle[~self.hinged[self.fixed_angle]]
-        force_x, force_y = ((force,) * len(self.followers) for force in (FORCE_X, FORCE_Y))
-        self.equations = (*force_x, *force_y, *(MOMENT,) * len(self.turned),
-                          *(FORCE_X,) * len(self.fixed_x), *(FORCE_Y,) * len(self.fixed_y),
-                          *(MOMENT,) * len(self.fixed_angle))
+        #: leaders whose x, y and rotation are fixed
+        self.supported = [self.leaders[on] for on in self.fixed[self.nodes[self.leaders]].T]
+        self.supported[2] = self.supported[2][~self.hinged[self.supported[2]]]
+        ends = (self.followers, self.followers, self.turned, *self.supported)
+        self.equations = tuple(np.repeat(2 * EQUATIONS, list(map(len, ends))).tolist())
         positions, directions, weights, start = [], [], [], []
         for k, beam in enumerate(layout.beams):
             at, first = chain_ends(beam).ravel(), layout.offset(k)
@@ -162,9 +155,9 @@ class Nodes(Joint):
         gap = r[self.leader[self.followers]] - r[self.followers]
         angle = np.conj(g[self.turned]) * g[self.leader[self.turned]]
         x, y, turn = (shift[0] for shift in self._shifts(np.array([t])))
-        return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[self.fixed_x, 0] - x,
-                               r[self.fixed_y, 1] - y,
-                               (np.exp(-1j * turn) * g[self.fixed_angle]).imag])
+        on_x, on_y, on_angle = self.supported
+        return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[on_x, 0] - x, r[on_y, 1] - y,
+                               (np.exp(-1j * turn) * g[on_angle]).imag])
 
     def offset(self, times: Array, N: int) -> Array:
         moved = self.moved(times, N)
@@ -181,13 +174,13 @@ class Nodes(Joint):
         """Rows and columns of all entries, and the values of the position equations."""
         s, n, k = self.followers, len(self.followers), len(self.turned)
         m, row = self.leader[s], np.arange(len(self.followers))
-        x, y = self.positions.T
-        a = 2 * n + k + np.arange(len(self.fixed_x))
-        b = a.size + 2 * n + k + np.arange(len(self.fixed_y))
+        (x, y), (on_x, on_y, on_angle) = self.positions.T, self.supported
+        a = 2 * n + k + np.arange(len(on_x))
+        b = a.size + 2 * n + k + np.arange(len(on_y))
         angles = [(2 * n, self.leader[self.turned]), (2 * n, self.turned),
-                  (len(self.equations) - len(self.fixed_angle), self.fixed_angle)]
+                  (len(self.equations) - len(on_angle), on_angle)]
         rows, columns = [row, row, n + row, n + row, a, b], [
-            x[m], x[s], y[m], y[s], x[self.fixed_x], y[self.fixed_y]]
+            x[m], x[s], y[m], y[s], x[on_x], y[on_y]]
         for first, ends in angles:
             at = self.directions[:, ends].transpose(1, 0, 2)
             rows.append(np.broadcast_to(first + np.arange(len(ends))[:, None, None], at.shape))
@@ -212,7 +205,7 @@ class Nodes(Joint):
         m = self.leader[s]
         return np.concatenate([
             self._pattern[2], self._angles(np.conj(g[s]), m), self._angles(-np.conj(g[m]), s),
-            self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.fixed_angle)])
+            self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.supported[2])])
 
     @cached_property
     def _places(self) -> Any:
@@ -230,7 +223,7 @@ class Nodes(Joint):
         out = np.tile(values, (len(times) if self.turning else 1, 1))
         if self.turning:
             for row, turn in zip(out, self._shifts(times)[2]):
-                last = self._angles(np.exp(-1j * turn), self.fixed_angle)
+                last = self._angles(np.exp(-1j * turn), self.supported[2])
                 row[len(row) - len(last):] = last
         return rows, columns, np.broadcast_to(out, (len(times), len(values)))
 
@@ -259,16 +252,14 @@ class Nodes(Joint):
 
     def split(self, multipliers: Array) -> tuple[Array, ...]:
         """Forces (followers, 2) and moments (turned,) of followers, and support reactions."""
-        n = len(self.followers)
-        sizes = [n, n, len(self.turned), len(self.fixed_x), len(self.fixed_y)]
-        x, y, *others = np.split(multipliers, np.cumsum(sizes))
+        ends = (self.followers, self.followers, self.turned, *self.supported[:2])
+        x, y, *others = np.split(multipliers, np.cumsum([len(at) for at in ends]))
         return np.stack([x, y], axis=1), *others
 
     def reaction(self, place: Any, u: Array, multipliers: Array) -> tuple[Array, float, dict]:
         """Reaction of some nodes: force, moment about the first of them, and both by name."""
         out, nodes = np.zeros(self.fixed.shape), self.graph.nodes_at(place)
-        ends = self.fixed_x, self.fixed_y, self.fixed_angle
-        for k, (at, part) in enumerate(zip(ends, self.split(multipliers)[2:])):
+        for k, (at, part) in enumerate(zip(self.supported, self.split(multipliers)[2:])):
             scale = np.abs(self.turns(u)[at]) if k == 2 else 1.0
             out[self.nodes[at], k] = -part * scale
         x, y, moment = out[nodes].T
@@ -282,7 +273,7 @@ class Nodes(Joint):
         n = len(self.nodes) // 2
         links = sparse.coo_array((np.ones(len(self.turned)),
                                   (self.turned // 2, self.leader[self.turned] // 2)), (n, n))
-        return np.asarray(connected_components(links, directed=False)[1])
+        return np.asarray(sparse.csgraph.connected_components(links, directed=False)[1])
 
     def fixed_motions(self, parts: Array, origin: Array, size: float, number: int) -> Any:
         """Constraints on rigid motions of groups; dense for one group, else sparse."""
@@ -294,8 +285,7 @@ class Nodes(Joint):
         rows, at, row = [np.zeros((0, 3))], [s[:0]], [s[:0]]
         count = 0
         for k, ends, others in ((0, self.leader[s], s), (1, self.leader[s], s),
-                                (0, self.fixed_x, s[:0]), (1, self.fixed_y, s[:0]),
-                                (2, self.fixed_angle, s[:0])):
+                                *((k, at, s[:0]) for k, at in enumerate(self.supported))):
             rows += [motion[k, :, ends], -motion[k, :, others]]
             at += [part[ends], part[others]]
             row += [count + np.arange(len(ends)), count + np.arange(len(others))]
@@ -309,12 +299,6 @@ class Nodes(Joint):
         return sparse.csr_array((values.ravel(), (np.repeat(i, 3), j.ravel())),
                                 shape=(count, 3 * number))
 
-    def describe(self, parts: Array) -> list[str]:
-        """Names of rigid groups, for messages."""
-        _, first = np.unique(parts, return_index=True)
-        if len(first) == 1:
-            return [""]
-        return [f" of the part with line {self.lines[k]}" for k in first]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         bound, several = self._thawed(), np.bincount(self.nodes) > 1

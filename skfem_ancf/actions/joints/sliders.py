@@ -9,7 +9,7 @@ import numpy as np
 from ...beam import Beam, Layout, RigidBody, WhichBeam, WhichMember, select_beam
 from ...core import (Array, ArrayLike, InputError, array_cache, hermite_basis, refuse,
                      require_direction, require_finite, require_flag, require_label,
-                     require_positive, shown)
+                     require_positive)
 from ...mesh.mapping import cross, turned
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol, tangent_at
@@ -91,14 +91,6 @@ def _slider(at: Vector, normal: Array) -> Symbol:
 
 # the axis of a beam as a curve, and the closest point on it
 
-#: Least number of sample points of an element for the initial search.
-
-
-SAMPLES = 5
-#: Largest number of iterations for the closest point.
-ITERATIONS = 40
-
-
 class Axis:
     """The axis of a beam, a polynomial of s in each element; ``first`` is the beam's first DOF."""
 
@@ -117,7 +109,7 @@ class Axis:
         for k in range(1, 4):
             self._powers[k, :, :-1] = self._powers[k - 1, :, 1:] * np.arange(1, degree + 1)
         self._start = np.asarray(beam.q0)
-        x = np.linspace(0.0, 1.0, max(SAMPLES, degree))
+        x = np.linspace(0.0, 1.0, max(5, degree))  # where the search for the closest point begins
         self._samples = self._powers[0] @ (x - 0.5) ** np.arange(degree + 1)[:, None]
         starts = (beam.mesh.t[0] * beam.nd)[:, None, None]
         self._dofs = first + starts + 2 * used + np.arange(2)[:, None]  # (ne, 2, nb)
@@ -162,7 +154,7 @@ class Axis:
         gap = np.sum((x - p[:, None]) ** 2, axis=1)
         e, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
         s, n = float(e + k / (gap.shape[1] - 1)), self.beam.mesh.nelements
-        for _ in range(ITERATIONS):
+        for _ in range(40):
             c, d, dd, _ = self.at(u, s)
             gap, size = c - p, float(d @ d)
             slope = size + float(gap @ dd)
@@ -183,10 +175,6 @@ class Axis:
 
 
 # discrete gradients of the equations of a sleeve between two displacements
-
-#: Least ``advance``, in elements, by which is divided.
-TINY = 1e-9
-
 
 def _mean(pair: Any) -> Array:
     return 0.5 * (pair[0] + pair[1])
@@ -245,30 +233,7 @@ class Span(NamedTuple):
     place: ScalarProduct  # G, zero at both ends
     equations: list[ScalarProduct]
     shares: Array  # f_s / G_s of each equation at both ends, (m, 2)
-
-    def rows(self) -> Array:
-        """D of each equation, shape (m, n)."""
-        return np.array([f.row - f.quotient / self.place.quotient * self.place.row
-                         for f in self.equations])
-
-    def force(self, multipliers: Array, v0: Array, v1: Array) -> Array:
-        """X with ``X . (u_1 - u_0) = multipliers . D (v_1 - v_0) / 2``."""
-        # both velocities satisfy the constraint; for quadratic Phi, X is -(multipliers . Phi'')
-        # (v_0 + v_1) / 4. The part linear in u_1 - u_0 is written as such; the rest has the factor
-        # s_1 - s_0, which is -G_u . (u_1 - u_0) / G_s
-        place, v = self.place, v0 + v1
-        passing = [place.rate(0, v0), place.rate(1, v1)]
-        out, work, rows = np.zeros(len(v)), 0.0, self.rows()
-        for f, share, multiplier, D in zip(self.equations, self.shares, multipliers, rows):
-            mean = f.quotient / place.quotient
-            row = -0.5 * (f.second(v) - mean * place.second(v))
-            row += 0.5 / place.quotient * (sum(passing) * f.mixed()
-                                           - (share @ passing) * place.mixed())
-            out += 0.5 * multiplier * row
-            work += 0.5 * multiplier * float(D @ (v1 - v0) - row @ self.change)
-        if abs(self.advance) > TINY:
-            out += work / float(place.row @ self.change) * place.row
-        return out
+    rows: Array  # D of each equation, (m, n)
 
 
 #: Tolerance beyond an end of a beam, in elements.
@@ -443,19 +408,37 @@ class Sleeve(Joint):
             equations.append(ScalarProduct(held(1, self.d).times(right), c.times(self.Q)))
         shares = [[by_s / slopes[6] for by_s, _ in slopes[8]]
                   for slopes in (self._slopes(u) for u in ends)]
-        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], ScalarProduct(c, gap),
-                    equations, np.array(shares).T)
+        place = ScalarProduct(c, gap)
+        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], place, equations,
+                    np.array(shares).T, np.array([
+                        f.row - f.quotient / place.quotient * place.row for f in equations]))
 
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
         span = self._span(u0, u1)
-        values, k = span.rows(), len(self.equations)
-        return np.repeat(np.arange(k), len(span.columns)), np.tile(span.columns, k), values.ravel()
+        k = len(self.equations)
+        return (np.repeat(np.arange(k), len(span.columns)), np.tile(span.columns, k),
+                span.rows.ravel())
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
+        # Both velocities satisfy the constraint; for quadratic Phi, X is -(multipliers . Phi'')
+        # (v0 + v1) / 4. The part linear in u1 - u0 is written as such; the rest has the factor
+        # s_1 - s_0, which is -G_u . (u1 - u0) / G_s.
         span = self._span(u0, u1)
-        at = span.columns
-        return np.bincount(at, span.force(multipliers, v0[at], v1[at]), len(u0))
+        place, at = span.place, span.columns
+        v0, v1, v = v0[at], v1[at], (v0 + v1)[at]
+        passing = [place.rate(0, v0), place.rate(1, v1)]
+        out, work = np.zeros(len(v)), 0.0
+        for f, share, multiplier, D in zip(span.equations, span.shares, multipliers, span.rows):
+            mean = f.quotient / place.quotient
+            row = -0.5 * (f.second(v) - mean * place.second(v))
+            row += 0.5 / place.quotient * (sum(passing) * f.mixed()
+                                           - (share @ passing) * place.mixed())
+            out += 0.5 * multiplier * row
+            work += 0.5 * multiplier * float(D @ (v1 - v0) - row @ span.change)
+        if abs(span.advance) > 1e-9:  # else there is nothing to divide by
+            out += work / float(place.row @ span.change) * place.row
+        return np.bincount(at, out, len(u0))
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at, beam = point(layout, *named_place(layout, self.at)), layout.beam(self.on)
@@ -524,8 +507,7 @@ def slider(layout: Layout, at: Any, on: WhichMember, direction: ArrayLike | None
     """A :class:`Sleeve` on a beam, or a :class:`Slot` of a rigid body or the ground."""
     at = tuple(named_place(layout, at))
     if is_ground(on) or isinstance(layout.beam(on), RigidBody):
-        if direction is None:
-            raise InputError(f"a slider on {shown(on)} needs the direction of its line")
-        return Slot(at, on, direction, angle=angle, name=name)
+        refuse(direction is None, "a slider on {!r} needs the direction of its line", on)
+        return Slot(at, on, direction, angle=angle, name=name)  # type: ignore[arg-type]
     refuse(direction is not None, "a slider on a beam moves along its axis: give no direction")
     return Sleeve(at, on, angle, name)  # type: ignore[arg-type]

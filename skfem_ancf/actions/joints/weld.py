@@ -14,14 +14,30 @@ from ...beam.kinematics import plane
 from ...core import (Array, ArrayLike, InputError, MeshError, Place, TimeFunction, ask_number,
                      refuse, require_finite_scalar, require_flag, require_function, require_label,
                      sample, shown)
-from ...mesh.places import facets_of, is_point, node_of
+from ...mesh.places import facets_of, is_point, node_of, points_of_rows
 from ..item import Item
 from ..loads import EndMoment
-from ..places import Vector, both_of, each, is_ground, point, section, several
+from ..places import Vector, both_of, is_ground, point, section
 from ..symbols import Symbol, boundary_of, support_of, supports_of
-from .base import ComposedJoint, Equation, Joint, aligned, angle_to, equations_of, rotation
+from .base import ComposedJoint, Equation, Joint, aligned, angle_to, rotation
 
 # hinge between two or more beams
+
+def _meeting(beams: Any, at: Any, what: str, names: tuple[str, ...]
+             ) -> tuple[tuple[Any, ...], tuple[Any, ...], tuple[str, ...]]:
+    """Two or more beams and bodies, the place of each, which is given once for all or once for
+    each, and names of the equations between the first and each of the others."""
+    refuse(not isinstance(beams, (tuple, list)) or len(beams) < 2, "beams must be two beams or "
+           "rigid bodies or more, by Beam, RigidBody, name or number, or 'ground', got {!r}", beams)
+    refuse(all(map(is_ground, beams)), "a joint needs a beam or a rigid body, got {!r}", beams)
+    refuse(at is None, "a joint needs {}", what)
+    at, n = points_of_rows(at), len(beams)
+    if isinstance(at, (str, np.ndarray)) or callable(at) or is_point(at):  # one place
+        at = (at,) * n
+    refuse(not isinstance(at, (tuple, list)) or len(at) != n, "a joint of {} beams needs {}, one "
+           "for all of them or one for each, as at=('right', 'left'), got {!r}", n, what, at)
+    return tuple(beams), tuple(at), names if n == 2 else tuple(
+        f"{name}, from number {k}" for k in range(1, n) for name in names)
 
 
 class Hinge(ComposedJoint):
@@ -37,10 +53,9 @@ class Hinge(ComposedJoint):
     """
 
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:
-        self.beams = several(beams)
-        self.at = each(at, "the point at=", len(self.beams))
+        self.beams, self.at, self.equations = _meeting(
+            beams, at, "the point at=", ("force along x", "force along y"))
         self.name = require_label("name", name)
-        self.equations = equations_of(("force along x", "force along y"), len(self.beams))
 
     def bind(self, layout: Layout) -> None:
         first, *others = (point(layout, beam, at) for beam, at in zip(self.beams, self.at))
@@ -51,12 +66,6 @@ class Hinge(ComposedJoint):
 
 
 # bond between a boundary of a domain and another member (mortar method)
-
-#: Round-off relative to the largest entry of an equation.
-
-
-ROUND_OFF = 1e-14
-
 
 class Glue(Joint):
     """The boundary of a domain bonded to the surface of another member: the mortar method.
@@ -109,7 +118,7 @@ class Glue(Joint):
                               at.ravel(), -(value[used] * w).ravel()))
         i, j, v = map(np.concatenate, zip(*found))
         A = sparse.coo_array((v / size[i], (i, j)), shape=(len(tests), layout.N)).tocsr().tocoo()
-        keep = np.abs(A.data) > ROUND_OFF
+        keep = np.abs(A.data) > 1e-14  # else round-off
         self.found = A.row[keep], A.col[keep], A.data[keep]
         self.equations = tuple(f"force along {'xy'[c]}" for c in tests % 2)
 
@@ -173,11 +182,9 @@ class Weld(ComposedJoint):
 
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None,
                  apart: bool = False) -> None:
-        self.beams, self.name = several(beams), require_label("name", name)
-        self.apart = require_flag("apart", apart)
-        self.at = each(at, "the section of each beam", len(self.beams))
-        self.equations = equations_of(("force along x", "force along y", "moment"),
-                                      len(self.beams))
+        self.beams, self.at, self.equations = _meeting(
+            beams, at, "the section of each beam", ("force along x", "force along y", "moment"))
+        self.name, self.apart = require_label("name", name), require_flag("apart", apart)
 
     def expand(self, layout: Layout) -> Sequence[Item]:
         """The weld, or a Glue between a boundary of a domain and a member that is not a cable."""
@@ -220,10 +227,6 @@ def symbol_of(joint: Any, layout: Layout, text: str, fixed: str,
     if any(map(is_ground, joint.beams)):
         return (support_of(layout, beam, place(layout, beam, at), fixed),)
     return (Symbol("joint", (place(layout, beam, at),), text=text),)
-
-
-#: Largest number of intervals of an integral over time.
-PIECES = 500
 
 
 class PrescribedPosition(ComposedJoint):
@@ -364,7 +367,7 @@ class Turned:
             return self.speed * t
         return float(scipy.integrate.quad(
             lambda s: ask_number("speed(t={:g})", self.speed, s), 0.0, t,
-            epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
+            epsabs=1e-13, epsrel=1e-13, limit=500)[0])
 
 
 class PrescribedTurn(ComposedJoint):
