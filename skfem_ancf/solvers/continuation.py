@@ -383,8 +383,20 @@ def _criticals(tracer, p, q, tol):
         if single or depth == DEPTH:
             if turns and change == 0:
                 continue  # a limit point changes the number: these rates are round-off
-            if turns:
-                out.append(("limit", _limit(tracer, p, a, b, tol), change))
+            if turns:  # the root of the rate of the load by the arc length
+                known = {a.arc: a, b.arc: b}
+
+                def rate(arc, known=known):
+                    if arc not in known:
+                        known[arc] = _at(tracer, p, arc)
+                    return known[arc].rate
+
+                # a parabola of the load, with the second derivative from the rates at both ends
+                near = np.sqrt(2e-3 * tol * abs(b.load) * (b.arc - a.arc) / abs(b.rate - a.rate))
+                arc = scipy.optimize.brentq(rate, a.arc, b.arc, xtol=max(near, tol * (
+                    b.arc - p.arc)))
+                out.append(("limit", replace(known[arc], iterations=0, negative=a.negative),
+                            change))
             if not turns or (not single and abs(change) != 1):
                 out.append(("bifurcation", _bifurcation(tracer, p, a, b, tol), change))
             continue
@@ -398,25 +410,10 @@ def _at(tracer, p, arc):
     return tracer.set_tangent(tracer.advance(p, arc - p.arc), p)
 
 
-def _limit(tracer, p, a, b, tol):
-    """The limit point between a and b: the root of the rate of the load by the arc length."""
-    known = {a.arc: a, b.arc: b}
-
-    def rate(arc):
-        if arc not in known:
-            known[arc] = _at(tracer, p, arc)
-        return known[arc].rate
-
-    # a parabola of the load, with the second derivative from the rates at both ends
-    near = np.sqrt(2e-3 * tol * abs(b.load) * (b.arc - a.arc) / abs(b.rate - a.rate))
-    arc = scipy.optimize.brentq(rate, a.arc, b.arc, xtol=max(near, tol * (b.arc - p.arc)))
-    return replace(known[arc], iterations=0, negative=a.negative)
-
-
 def _bifurcation(tracer, p, a, b, tol):
     """Where the count of negative eigenvalues changes: bisection, and secants of the smallest."""
     end = tol * (b.arc - p.arc)
-    mode, values = None, {}
+    v, m, values = None, None, {}
     low, high, best = a, b, b
     for _ in range(100):
         x = 0.5 * (low.arc + high.arc)
@@ -427,27 +424,22 @@ def _bifurcation(tracer, p, a, b, tol):
             guess += np.sign(x - guess) * 0.1 * min(guess - low.arc, high.arc - guess)
             x = guess
         best = _at(tracer, p, x)
-        mode, value = _smallest(tracer, best, mode)
-        values[best.arc] = value
+        # the eigenvalue closest to zero of the tangent over its diagonal, by the inverse power
+        # method from the last mode
+        system, first = tracer.system, v is None
+        tracer.factorize(best)
+        D = np.abs(system.K.diagonal()) * system.constraints.mask
+        if first:
+            v = np.random.default_rng(0).standard_normal(system.N)
+        v = v * system.constraints.mask
+        for _ in range(12 if first else 4):
+            unit = v / np.sqrt(v @ (D * v))
+            v, m = system.solver.solve(D * unit, np.zeros(system.constraints.m))
+            values[best.arc] = 1.0 / (unit @ (D * v))
         low, high = (best, high) if best.negative == a.negative else (low, best)
         if high.arc - low.arc <= end:
             break
-    v, m = mode
     return replace(best, iterations=0, rate=0.0, tangent=v / tracer.norm(v),
                    multiplier_rate=m / tracer.norm(v), negative=a.negative)
 
 
-def _smallest(tracer, point, start=None):
-    """The eigenvalue closest to zero of the tangent stiffness over its diagonal, and its vector."""
-    # By the inverse power method from ``start``, a vector (N,) and multipliers (m,).
-    system = tracer.system
-    tracer.factorize(point)
-    D, none = np.abs(system.K.diagonal()) * system.constraints.mask, np.zeros(system.constraints.m)
-    x = np.random.default_rng(0).standard_normal(system.N) if start is None else start[0]
-    x, value = x * system.constraints.mask, np.nan
-    for _ in range(12 if start is None else 4):
-        x = x / np.sqrt(x @ (D * x))
-        y, m = system.solver.solve(D * x, none)
-        value = 1.0 / (x @ (D * y))
-        x = y
-    return (x, m), value

@@ -167,7 +167,14 @@ def _sparse(tangent, state, M, k, shift):
     start = inverse.solve(rng.standard_normal(M.shape[0]))
     apply = inverse.once if inverse.left < UNREFINED else inverse.solve
     values, X = _polished(tangent, M, inverse, _lanczos(M, k, shift, apply, start))
-    while missing := _missing(tangent, state, shift, values):
+    while True:
+        below = values[-1] - SAME * max(abs(values[-1]), shift)
+        try:  # the number below the largest one found, by Sylvester's law of inertia
+            missing = _negative(tangent, state, -below) - int(np.sum(values < below))
+        except NO_FACTORS:
+            missing = 1
+        if missing <= 0:
+            break
 
         def others(b, X=X, theta=1.0 / (values + shift)):
             return apply(b) - X @ (theta * (X.T @ b))
@@ -189,17 +196,6 @@ def _lanczos(M, k, shift, apply, start):
     except ArpackNoConvergence as failure:
         raise ConvergenceError(f"Lanczos found {len(failure.eigenvalues)} of {k} modes; try "
                                "another number") from None
-
-
-def _missing(tangent, state, shift, values):
-    """Number of missing eigenvalues below the largest one found, by Sylvester's law of inertia."""
-    # It is 1 if there are no factors.
-    below = values[-1] - SAME * max(abs(values[-1]), shift)
-    try:
-        number = _negative(tangent, state, -below)
-    except NO_FACTORS:
-        return 1
-    return max(number - int(np.sum(values < below)), 0)
 
 
 def _quotients(tangent, M, X):

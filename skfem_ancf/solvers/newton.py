@@ -19,7 +19,6 @@ from .continuation import continuation
 from .increment import Increment, Options, Route
 from .iteration import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
-from .strategies import MOST_FROM_SOFT
 from .without_contact import solved_without_contact
 
 logger = logging.getLogger(__name__)
@@ -323,7 +322,7 @@ class Search:
         route, result = self.route, self._beginning(self.route)
         options = self._options(route, method, watched=True)
         if self.touches and self.stable:  # a descent follows
-            options = options._replace(patience=MOST_FROM_SOFT)
+            options = options._replace(patience=strategies.MOST_FROM_SOFT)
         step = Increment(self.system, result, 1.0, options)
         try:
             found = step.solve(self.stable)
@@ -390,7 +389,8 @@ class Search:
                 system.after(result.memory), result.u, result.multipliers):
             self._loose, self._unstabilised = "", self._unstabilised + 1
             try:  # from the last factors
-                if (v := strategies.Descent(system).lowest_direction()) is not None:
+                value, v = strategies.Descent(system).extreme("SA")
+                if value < 0.0:
                     self._loose = stability.motion_in_words(system, result.u, v)
             except NO_FACTORS:
                 pass
