@@ -7,7 +7,8 @@ import numpy as np
 from ..actions.forces.kernels import add_resisting_force, settle_contact, settle_elements
 from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import accept_body, add_viscous_force, body_tangent
-from ..core.band import Band, clear, dot, multiply, solve, solve_dependent, subtract_rows
+from ..core.band import (Band, add_multiple, clear, copy, dot, multiply, solve, solve_dependent,
+                         solve_many, subtract_rows)
 from ..core.callbacks import JOINTS, call_custom
 from ..core import C2, F1, F2, F3, I1, MADE, apart, indices, source
 from ..equations.tables import Equations
@@ -45,13 +46,10 @@ def damping_force(e, dampers, M, t, u, v, mixed, out, scratch):
         add_resisting_force(e.forces, t, u, v, out)
     if dampers.mass > 0.0:
         multiply(M, v, scratch)
-        for i in indices(out.size):
-            out[i] += dampers.mass * scratch[i]
+        add_multiple(dampers.mass, scratch, out)
     for k in range(dampers.modes.shape[0]):
         row = dampers.modes[k]
-        size = dot(row, v)
-        for i in indices(out.size):
-            out[i] += size * row[i]
+        add_multiple(dot(row, v), row, out)
 
 
 @source
@@ -61,32 +59,22 @@ def add_damping(viscous, dampers, M, factor, u, stresses, scratch, A):
     if dampers.viscous > 0:
         yes = dampers.viscous > 0
         body_tangent(viscous, u, scratch, stresses[0], yes, stresses[2], dampers.D)
-        for i in indices(A.flat.size):
-            A.flat[i] += factor * dampers.D.flat[i]
+        add_multiple(factor, dampers.D.flat, A.flat)
     if dampers.mass > 0.0:
-        for i in indices(A.flat.size):
-            A.flat[i] += factor * dampers.mass * M.flat[i]
+        add_multiple(factor * dampers.mass, M.flat, A.flat)
 
 
 @apart("rows", Band, LowRankRows, F1)
 def factorize_rows(A, rows, free):
     """Set Z and H with the factors of A."""
-    P, S, Z, H = rows.P, rows.S, rows.Z, rows.H
-    k = P.shape[0]
-    G = np.empty((k, k))
-    for a in range(k):  # Z = P A^-1
-        row, out = P[a], Z[a]
+    P, Z, H = rows.P, rows.Z, rows.H
+    for a in range(P.shape[0]):  # Z = P A^-1
         for i in indices(free.size):
-            out[i] = row[i] * free[i]
-        solve(A, out)
-    for a in range(k):
-        for b in range(k):
-            G[a, b] = dot(P[a], Z[b])
-    for a in range(k):
-        for b in range(k):
-            H[a, b] = 1.0 if a == b else 0.0
-            for c in range(k):
-                H[a, b] += S[a, c] * G[c, b]
+            Z[a, i] = P[a, i] * free[i]
+    solve_many(A, Z)
+    np.dot(rows.S, np.dot(P, Z.T), H)
+    for a in range(P.shape[0]):
+        H[a, a] += 1.0
 
 
 @source
@@ -100,14 +88,8 @@ def solve_rows(A, rows, x):
 @apart("rows", LowRankRows, F1)
 def _correct_rows(rows, x):
     """The part of :func:`solve_rows` beside the band."""
-    k = rows.P.shape[0]
-    y, z, H = np.empty(k), np.zeros(k), rows.H.copy()
-    for a in range(k):
-        y[a] = dot(rows.P[a], x)
-    for a in range(k):
-        for c in range(k):
-            z[a] += rows.S[a, c] * y[c]
-    solve_dependent(H, z)
+    z = np.dot(rows.S, np.dot(rows.P, x))
+    solve_dependent(rows.H.copy(), z)
     subtract_rows(rows.Z, z, x)
 
 
@@ -137,9 +119,7 @@ class JointMotions(NamedTuple):
 @apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1)
 def drive_rate(joints, motion, t, dt, u, out):
     """The partial rate of Phi, c' + g' . u, at the end t of a step of dt."""
-    c = motion.c[1]
-    for k in indices(out.size):
-        out[k] = c[k]
+    copy(motion.c[1], out)
     if joints.custom == 0:
         add_products(out, joints.gk, motion.g[2], u, joints.gi)
     elif motion.drives > 0:
@@ -149,9 +129,8 @@ def drive_rate(joints, motion, t, dt, u, out):
 @apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1, F1)
 def acceleration_of_joints(joints, motion, t, dt, u, v, out):
     """The second rate of Phi without accelerations: c'' + v . H v + g'' . u + 2 g' . v."""
-    c, g = motion.c[2], motion.g[2]
-    for k in indices(out.size):
-        out[k] = c[k]
+    g = motion.g[2]
+    copy(motion.c[2], out)
     if joints.custom == 0:
         add_triples(out, joints.hk, joints.hv, v, joints.hi, v, joints.hj)
         add_products(out, joints.gk, motion.g[3], u, joints.gi)
@@ -173,11 +152,9 @@ def _add_differences(joints, t, dt, u, v, first, second, along, out):
         for k in range(2):
             c = first * _FIRST[part] + second * _SECOND[part] if k == 0 else along * _FIRST[part]
             if c != 0.0:
-                for i in indices(out.size):
-                    values[i] = 0.0
+                clear(values)
                 call_custom(JOINTS, joints.custom, 7 + k, time, 1.0, u, v, values)
-                for i in indices(out.size):
-                    out[i] += c * values[i]
+                add_multiple(c, values, out)
 
 
 class Rule(NamedTuple):
@@ -377,14 +354,17 @@ ALL = Equations, Matrices, Annotated[Rule, MADE], Annotated[Step, MADE], Work, S
 
 
 @source
-def settle(e, t, along, u0, u1, v1, taken):
-    """Update the history at the end of a step; ``taken`` is the dissipated work."""
+def settle(e, t, along, u0, u1, v1, state, history):
+    """Update the history at the end of a step, which is written to ``history``."""
     # ``t`` are the instants of the forces of contact and of the end. Contact works from u0 to u1 in
     # the time ``along`` of a conserving step, or at u1 if that is 0.
+    taken = np.empty(1)  # the dissipated work
     settle_contact(e.forces, t[0], along, u0 if along != 0.0 else u1, u1, taken)
     settle_elements(e.forces, t[1], u0, u1, v1, taken)
     accept_body(e.body, u0, u1, taken)
     e.span[0] = 0.0
+    state.dissipated[0] += taken[0]
+    copy(e.history, history)
 
 
 @source
@@ -399,14 +379,10 @@ def mass_factor(rule, dt):
 
 
 @source
-def damping_factor(rule, dt):
-    """dv / du_1, the factor of D in the iteration matrix."""
-    return (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / dt
-
-
-@source
 def step_of(joints, rule, block, n):
     """The :class:`Step` number n."""
+    # the factor of D in the iteration matrix is dv / du_1
+    damping_factor = (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / block.dt
     c, g = block.joints.c, block.joints.g
     constant = joints.hk.size == 0 and joints.custom == 0
     kept = constant and g.shape[0] == 1 and n > 0
@@ -414,5 +390,5 @@ def step_of(joints, rule, block, n):
     return Step(block.dt, block.times[n, 0], block.times[n, 1],
                 row_of(block.factors, n), row_of(block.ends, n), row_of(block.supports, n),
                 joints_now,
-                mass_factor(rule, block.dt), damping_factor(rule, block.dt),
+                mass_factor(rule, block.dt), damping_factor,
                 0.5 if rule.conserving > 0 else 1.0, constant, kept)

@@ -306,18 +306,40 @@ class Run:
     # steps
 
     def advance(self) -> None:
-        """Take a step, or a block of steps; raises TimeStepFailed."""
-        if self._sizes is not None:
-            self._automatic()
-            return
+        """Take a step or a block of steps, or reject a step; raises TimeStepFailed."""
         if self._in_blocks and self._n < self._whole and self._block():
             return
-        old, h = self.y, self._end - self.y.t
-        if self._n < self._count - 1 or abs(h - self._size) < 1e-9 * self._size:
-            h = self._size
-        new = self.integrator.step(old, h)
-        new.t = self._time(self._n + 1)
-        self._commit(old, new)
+        y, left = self.y, self._end - self.y.t
+        if self._sizes is None:
+            whole = self._n < self._count - 1 or abs(left - self._size) < 1e-9 * self._size
+            new = self.integrator.step(y, self._size if whole else left)
+            new.t = self._time(self._n + 1)
+            self._commit(y, new)
+            return
+        h = self._sizes.cut(y.t, min(self._size, left))
+        if left < (1 + 1e-3) * h:
+            h = left
+        elif left < 2 * h:
+            h = 0.5 * left
+        touches = self.system.forces.contacts.obstacles  # halved steps find the time of impact
+        try:
+            new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
+            error = self._sizes.error(self.integrator, y, new, h)
+            self._size, kept = self._sizes.next(error, h, self._size)
+        except TimeStepFailed:
+            if h < SHORTEST * self.task.span:
+                raise
+            self._size, kept, self._stuck = 0.5 * h, False, self._stuck + 2
+            past = self.integrator.leap(y, h) if self._stuck >= 2 * DEPTH else None
+            if past is not None and past.t < self._end:
+                new, h, kept, self._stuck = past, past.t - y.t, True, 0
+        if not kept:
+            self.rejected += 1
+            return
+        self._stuck = max(0, self._stuck - 1)
+        if h == left:
+            new.t = self._end
+        self._commit(y, new)
 
     def _block(self):
         """Take a block of steps of one size; False if none succeeded."""
@@ -348,34 +370,6 @@ class Run:
         if self.integrator.stopped:
             raise KeyboardInterrupt
         return True
-
-    def _automatic(self):
-        """Take one step of automatic size, or reject it."""
-        y, left = self.y, self._end - self.y.t
-        h = self._sizes.cut(y.t, min(self._size, left))
-        if left < (1 + 1e-3) * h:
-            h = left
-        elif left < 2 * h:
-            h = 0.5 * left
-        touches = self.system.forces.contacts.obstacles  # halved steps find the time of impact
-        try:
-            new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
-            error = self._sizes.error(self.integrator, y, new, h)
-            self._size, kept = self._sizes.next(error, h, self._size)
-        except TimeStepFailed:
-            if h < SHORTEST * self.task.span:
-                raise
-            self._size, kept, self._stuck = 0.5 * h, False, self._stuck + 2
-            past = self.integrator.leap(y, h) if self._stuck >= 2 * DEPTH else None
-            if past is not None and past.t < self._end:
-                new, h, kept, self._stuck = past, past.t - y.t, True, 0
-        if not kept:
-            self.rejected += 1
-            return
-        self._stuck = max(0, self._stuck - 1)
-        if h == left:
-            new.t = self._end
-        self._commit(y, new)
 
     def _commit(self, old, new):
         """Accept a step: find events, pass breakpoints, record and store."""

@@ -14,7 +14,8 @@ from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, a
 from ..beam.strain_energy import (add_force_of, add_viscous_stress, body_force, body_linearised,
                                   body_mean_stress, body_mixed, body_stress, body_tangent)
 from ..core.band import (add_multiple, clear, copy, factorize, factorize_complex, fix, fix_stored,
-                         multiply, solve, solve_columns, solve_dependent, solve_joined)
+                         multiply, solve, solve_columns, solve_dependent, solve_joined,
+                         subtract_rows)
 from ..core import indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
                                      SINGULAR, correction_size, judged, motion_size,
@@ -40,8 +41,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     """Factorise the iteration matrices at the mean of the points; False on failure."""
     origin, f, S, yes = w.origins[0], w.x[0], w.stresses, w.x.size > 0
     at, e.span[0] = step * (method.points.size + 1), s.h
-    for i in indices(origin.size):
-        origin[i] = 0.0
+    clear(origin)
     for k in range(method.points.size):
         add_multiple(method.weights[k], w.U[k], origin)
     for k in range(1, method.points.size):
@@ -53,9 +53,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
     add_load_stiffness(e.loads, row_of(s.factors, at), s.times[at], 1.0, origin, e.K)
     add_element_tangent(e.forces, s.times[at], origin, e.K)
-    D = w.D.flat
-    for i in indices(D.size):
-        D[i] = 0.0
+    clear(w.D.flat)
     if matrices.dampers.active > 0:
         add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
         if matrices.dampers.elements > 0:
@@ -81,30 +79,25 @@ def factorize_stages(e, matrices, method, s, w, state, step):
         for j in range(w.J.shape[0]):
             x, y = w.Y[2 * k, j], w.Y[2 * k + 1, j]
             copy(w.J[j], x)
-            for i in indices(y.size):
-                y[i] = 0.0
+            clear(y)
             solve_for(w, k, x, y)
-        _form_schur_complement(w, s.h, k)
+        if w.J.shape[0] > 0:
+            _form_schur_complement(w, s.h, k)
     return True
 
 
 @source
 def _form_schur_complement(w, h, k):
     """Schur complement of the low-rank rows for the eigenvalue k."""
-    q, Q, b, m, values = w.q, w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
-    for a in range(b):
-        for j in range(b):
-            re, im = np.dot(w.J[a], w.Y[2 * k, j]), np.dot(w.J[a], w.Y[2 * k + 1, j])
-            q[j, a], q[b + j, b + a], q[b + j, a], q[j, b + a] = re, re, -im, im  # its columns
-    if b > m:
-        for j in range(2 * b):
-            _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, q[j])
+    q, b, m, values = w.q, w.J.shape[0], w.l.shape[1], w.method.values
+    re, im = np.dot(w.Y[2 * k], w.J.T), np.dot(w.Y[2 * k + 1], w.J.T)
+    q[:b, :b], q[b:, b:], q[b:, :b], q[:b, b:] = re, re, -im, im  # its columns
+    for j in range(2 * b if b > m else 0):
+        _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, q[j])
     for a in range(m, b):
         q[a, a] += 1.0
         q[b + a, b + a] += 1.0
-    for a in range(2 * b):
-        for j in range(2 * b):
-            Q[a, j] = q[j, a]
+    w.Q[k] = q.T
 
 
 @source
@@ -132,17 +125,9 @@ def _rows(e, matrices, s, w, at):
 @source
 def _stiffen(S, p, z, m, column):
     """The last rows of a column of ``q f = r`` times ``C = S[0] + (p + i z) S[1]``."""
-    k, b = S.shape[1], column.size // 2
-    scratch = np.empty(2 * k)
-    for a in range(k):
-        scratch[a], scratch[k + a] = column[m + a], column[b + m + a]
-    for a in range(k):
-        re, im = 0.0, 0.0
-        for c in range(k):
-            C, D = S[0, a, c] + p * S[1, a, c], z * S[1, a, c]
-            re += C * scratch[c] - D * scratch[k + c]
-            im += C * scratch[k + c] + D * scratch[c]
-        column[m + a], column[b + m + a] = re, im
+    b = column.size // 2
+    C, D, x, y = S[0] + p * S[1], z * S[1], column[m:b].copy(), column[b + m:].copy()
+    column[m:b], column[b + m:] = np.dot(C, x) - np.dot(D, y), np.dot(C, y) + np.dot(D, x)
 
 
 @source
@@ -163,29 +148,23 @@ def solve_for(w, k, x, y):
 def join(method, s, w, k, r, q, x, y):
     """Correct x + i y, solved with the band, by forces r along the low-rank rows J. For joints ``mu
     / h J x = -gap``; the force of other rows is ``C J x``."""
-    m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
+    m, b = w.l.shape[1], w.J.shape[0]
     p, z = method.values[0, k], method.values[1, k]
     c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
-    for a in range(b):
-        J = w.J[a]
-        r[a], r[b + a] = np.dot(J, x), np.dot(J, y)
-    for a in range(m):
-        re, im = 0.0, 0.0
-        for j in range(n):
-            re += method.to[0, k, j] * w.gaps[j, a]
-            im += method.to[1, k, j] * w.gaps[j, a]
-        r[a] += c * re - d * im
-        r[b + a] += c * im + d * re
+    r[:b], r[b:] = np.dot(w.J, x), np.dot(w.J, y)
+    for j in range(method.points.size if m > 0 else 0):
+        re, im = method.to[0, k, j], method.to[1, k, j]
+        add_multiple(c * re - d * im, w.gaps[j], r[:m])
+        add_multiple(c * im + d * re, w.gaps[j], r[b:b + m])
     if b > m:
         _stiffen(w.S, p / s.h, z / s.h, m, r)
     copy(flat_points(w.Q[k]), flat_points(q))
     if not solve_dependent(q, r):
         return False
-    for a in range(b):
-        re, im, f, g = w.Y[2 * k, a], w.Y[2 * k + 1, a], r[a], r[b + a]
-        for i in indices(x.size):
-            x[i] -= f * re[i] - g * im[i]
-            y[i] -= f * im[i] + g * re[i]
+    subtract_rows(w.Y[2 * k], r[:b], x)
+    subtract_rows(w.Y[2 * k + 1], -r[b:], x)
+    subtract_rows(w.Y[2 * k + 1], r[:b], y)
+    subtract_rows(w.Y[2 * k], r[b:], y)
     return True
 
 
@@ -213,7 +192,6 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
     # Written for each step as by :func:`~skfem_ancf.dynamics.steps.steps`, w is the acceleration;
     # and displacements and multipliers of the points, (s, n, N + m).
     method = w.method
-    taken = np.empty(1)
     if e.lasting > 0:
         set_contact_rate(e.forces, s.h)
     for k in range(rows.shape[0]):
@@ -232,9 +210,7 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
             if e.lasting >= MATERIALS:
                 carry_eigenstrains(e.loads, row_of(
                     s.factors, (k + 1) * (method.points.size + 1) - 1))
-            settle(e, (t, t), 0.0, w.before[0], w.y[0], w.y[1], taken)
-            state.dissipated[0] += taken[0]
-            copy(e.history, memories[k, 2:])
+            settle(e, (t, t), 0.0, w.before[0], w.y[0], w.y[1], state, memories[k, 2:])
         state.last_dt[0], state.mixed_steps[0] = s.h, max(0, state.mixed_steps[0] - 1)
         for j in range(4):
             copy(w.y[min(j, 2)], rows[k, j])
@@ -394,12 +370,10 @@ def _close(e, matrices, s, w, motion, t, step):
     for k in range(CLOSINGS):
         joint_directions(e.joints, g, t, u, w.end[0])
         constraint(e.joints, motion.c[0], g, t, u, w.shares)
-        for i in indices(x.size):
-            x[i] = 0.0
+        clear(x)
         if not _meet(matrices.mass, e.free, w, x, bends or (turns and k == 0)):
             return False
-        for i in indices(x.size):
-            u[i] += x[i]
+        add_multiple(1.0, x, u)
     joint_directions(e.joints, g, t, u, w.end[0])
     drive_rate(e.joints, motion, t, s.h, u, w.shares)
     return _meet(matrices.mass, e.free, w, v, bends)
@@ -440,7 +414,7 @@ def _states(free, method, s, w, step, rates):
         constrained = row_of(s.constrained, step * (n + 1) + k)
         for i in indices(N):
             U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + constrained[0, i]
-            W[i] = 0.0
+        clear(W)
         for j in range(n):
             add_multiple(method.second[k, j] / (s.h * s.h), w.Z[j], W)
         for i in indices(N):
@@ -491,12 +465,10 @@ def _residual(e, matrices, method, s, w, state, step, k):
     add_elastic_force(e.forces, t, 0.0, u, u, 0, f)
     if matrices.dampers.active > 0:
         damping_force(e, matrices.dampers, matrices.M, t, u, v, state.mixed_steps[0], d, scratch)
-        for i in indices(f.size):
-            f[i] += d[i]
+        add_multiple(1.0, d, f)
     external_force(e.loads, row_of(s.factors, at), t, 1.0, u, Q)
     multiply(matrices.M, w.W[k], scratch)
-    for i in indices(f.size):
-        f[i] += scratch[i]
+    add_multiple(1.0, scratch, f)
     if w.gaps.shape[1] > 0:
         gap, l, motion = w.gaps[k], w.l[k], motion_at(s.joints, at)
         g = motion.g
@@ -516,9 +488,8 @@ def _correct(e, method, s, w, state):
     clear(flat_points(D))
     clear(flat_points(dl))
     for k in range(method.values.shape[1]):
-        for i in indices(N):
-            x[i] = 0.0
-            y[i] = 0.0
+        clear(x)
+        clear(y)
         for j in range(n):
             add_multiple(method.to[0, k, j], w.R[j], x)
             add_multiple(method.to[1, k, j], w.R[j], y)
@@ -529,13 +500,11 @@ def _correct(e, method, s, w, state):
             c, d = method.back[0, j, k], method.back[1, j, k]
             add_multiple(c, x, D[j])
             add_multiple(-d, y, D[j])
-            for l in range(m):
-                dl[j, l] += c * r[l] - d * r[b + l]
-    for j in range(n):
-        gap, l, share = w.gaps[j], w.l[j], dl[j]
-        for a in range(m):
-            gap[a] = np.dot(w.J[a], D[j])  # that the correction closes
-            l[a] += share[a]
+            add_multiple(c, r[:m], dl[j])
+            add_multiple(-d, r[b:b + m], dl[j])
+    if m > 0:
+        np.dot(D, w.J[:m].T, w.gaps)  # that the correction closes
+        add_multiple(1.0, flat_points(dl), flat_points(w.l))
     state.last_correction[0] = state.correction[0]
     state.correction[0] = correction_size(e, flat_points(w.R), flat_points(D),
                                           flat_points(w.gaps), flat_points(dl))
