@@ -6,6 +6,7 @@ from copy import copy
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 from scipy import sparse
 
 from ..actions.bound import BoundConstraint, everywhere, is_table
@@ -15,7 +16,7 @@ from ..beam import Beam, RigidBody
 from ..core.band import dense
 from ..core import Array, InputError, ModelWarning, SupportError, cached_property, is_builtin, shown
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
-from .rank import DENSE, FREE, first_dependent
+from .rank import DENSE, DEPENDENT, FREE, groups
 
 #: Largest number of multipliers with dense Jacobians.
 FEW = 96
@@ -56,15 +57,16 @@ class Constraints:
         self._fixing: list[Any] = []
         zero, fixed, held, first = np.zeros(self.N), [self.fixed], [self._held], len(self.fixed)
         for joint in joints:
-            found = _fixes(joint, zero) if joint.constant else None
-            if found is None:
+            rows, dofs, factors = joint.entries(zero, 0.0) if joint.constant else _NO_ENTRIES
+            order = rows.argsort()
+            fixes = (joint.constant and rows[order].tolist() == list(range(len(joint.equations)))
+                     and factors.all())  # one DOF in each equation
+            dofs, factors = dofs[order], factors[order]
+            held_already = not self.free.take(dofs).all()
+            if not fixes or held_already and not joint.moving:
                 self.joints.append(joint)
                 continue
-            dofs, factors = found
-            if not self.free.take(dofs).all():
-                if not joint.moving:
-                    self.joints.append(joint)
-                    continue
+            if held_already:
                 clash = np.sort(dofs[~self.free[dofs]])
                 raise SupportError(
                     f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
@@ -85,7 +87,11 @@ class Constraints:
         """Remove redundant equations of joints, with a warning."""
         if not self.joints or self.condensable:
             return
-        self._independent = self._apart or self._dependent() is None
+        rows, columns, values = self.slopes
+        # each DOF of the joints is free and occurs in one equation only
+        apart = (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
+                 and bool(self.free.take(columns).all()) and bool(values.all()))
+        self._independent = apart or self._dependent() is None
         if self._independent:
             return
         found, self.passing = repeated(self)
@@ -128,15 +134,11 @@ class Constraints:
 
     def values(self, load: float, t: float | None = None) -> Array:
         """Displacements of the fixed DOFs (nfixed,) at a load factor and a time."""
-        values = load * self.given + self._held
-        for joint, first, factors in self._moving:
-            phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
-            values[first:first + len(factors)] = -phi / factors
-        return values
+        return self.values_at(np.array([load if t is None else t]), load)[0]
 
-    def values_at(self, times: Array) -> Array:
-        """Displacements of the fixed DOFs at full load, at times (n,): (n, nfixed)."""
-        values = np.tile(self.given + self._held, (len(times), 1))
+    def values_at(self, times: Array, load: float = 1.0) -> Array:
+        """Displacements of the fixed DOFs at times (n,), by default at full load: (n, nfixed)."""
+        values = np.tile(load * self.given + self._held, (len(times), 1))
         for joint, first, factors in self._moving:
             values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
         return values
@@ -296,7 +298,8 @@ class Constraints:
                 joint.mean_entries(v, u, t) for joint in self.joints)).ravel()
         elif what == 6:
             v0, v1, u0 = v[:3 * N].reshape(3, N)
-            out += self.mean_turning(u0, u, v0, v1, t, v[3 * N:])
+            for joint, impulse in zip(self.joints, self.multipliers_of(v[3 * N:])):
+                out += joint.mean_turning(u0, u, v0, v1, t, impulse)
         for joint in self.joints if what in (4, 7, 8) else ():
             part = out[first:first + len(joint.equations)]
             first += len(part)
@@ -324,13 +327,6 @@ class Constraints:
                      for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
             i, j, v = _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
         return i, j, v * (self.free[i] & self.free[j])
-
-    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
-                     multipliers: Array) -> Array:
-        """The correction of conserving steps for joints that are not quadratic, shape (N,)."""
-        parts = zip(self.joints, self.multipliers_of(multipliers))
-        return sum((joint.mean_turning(u0, u1, v0, v1, t, part) for joint, part in parts),
-                   np.zeros(self.N))
 
     @cached_property
     def _limited(self) -> list[BoundConstraint]:
@@ -431,10 +427,24 @@ class Constraints:
                 f"{value:g} if the motion starts from the displaced static state")
 
     def _dependent(self):
-        """The first dependent equation, see :func:`.rank.first_dependent`."""
-        zero = np.zeros(self.N)
-        return first_dependent(self._at_rest * self.coordinate_sizes, self.free,
-                               lambda: self.constraint(zero, 0.0))
+        """The first equation that depends on those before it at free DOFs, or None; with its
+        residual when those before it are met."""
+        # Rows are orthogonalised by QR in order, in groups without a common column.
+        J, first = self._at_rest * self.coordinate_sizes, None
+        size = np.sqrt((J * J).sum(axis=1))
+        for rows, _, A in groups(J * self.free):
+            if first is not None and rows[0] > first[0]:
+                continue
+            R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # in the upper triangle
+            rest, k = np.zeros(len(rows)), min(R.shape)
+            rest[:k] = np.abs(R.diagonal())
+            small = rest <= DEPENDENT * size[rows]
+            k = int(small.argmax())
+            if small[k] and (first is None or rows[k] < first[0]):
+                gap = self.constraint(np.zeros(self.N), 0.0)[rows]
+                known = scipy.linalg.solve_triangular(R[:k, :k], gap[:k], trans="T")
+                first = int(rows[k]), float(gap[k] - R[:k, k] @ known)
+        return first
 
     def require_independent_joints(self) -> None:
         """Raise SupportError if equations of joints and supports are dependent."""
@@ -454,13 +464,6 @@ class Constraints:
                                "position, or solve in time with scene.integrate")
         raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
                            "joints before it prescribe already: remove one of them")
-
-    @property
-    def _apart(self):
-        """True if each DOF of the joints is free and occurs in one equation only."""
-        rows, columns, values = self.slopes
-        return (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
-                and bool(self.free.take(columns).all()) and bool(values.all()))
 
     @property
     def few(self) -> bool:
@@ -513,11 +516,3 @@ class Constraints:
 def _joined(parts):
     """Concatenate rows, columns and values of several tables."""
     return parts[0] if len(parts) == 1 else tuple(map(np.concatenate, zip(*parts)))
-
-
-def _fixes(joint, zero):
-    """DOFs that a joint fixes, and their factors; None if it does more than that."""
-    rows, dofs, factors = joint.entries(zero, 0.0)
-    order = rows.argsort()
-    each = rows[order].tolist() == list(range(len(joint.equations)))
-    return (dofs[order], factors[order]) if each and factors.all() else None

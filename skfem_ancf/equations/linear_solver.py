@@ -304,12 +304,7 @@ class NullSpace:
             at = np.take_along_axis(block.columns, pivots, axis=1)
             given[at] = True
             self._groups.append((block, at, R, M))
-        self._T = self._basis(given)
-        self._reduced = (self._T.T @ self._K @ self._T).tocsc() if m else self._K
-        self._lu, self._plain = self._factors(K.symmetric)
-
-    def _basis(self, given):
-        """A basis (n, n - m) of the null space of J."""
+        # a basis (n, n - m) of the null space of J
         free = np.flatnonzero(~given)
         number = np.cumsum(~given) - 1
         parts = [(free, number[free], np.ones(len(free)))]
@@ -317,12 +312,11 @@ class NullSpace:
             g, a, b = np.nonzero(R * ~given[block.columns][:, None])
             parts.append((at[g, a], number[block.columns[g, b]], -R[g, a, b]))
         i, j, v = map(np.concatenate, zip(*parts))
-        return sparse.csc_array((v, (i, j)), shape=(len(given), len(free)))
-
-    def _factors(self, symmetric):
-        """LU factors, and whether all pivots are on the diagonal."""
-        lu = diagonal_factors(self._reduced, "MMD_AT_PLUS_A") if symmetric else None
-        return (splu(self._reduced), False) if lu is None else (lu, True)
+        self._T = sparse.csc_array((v, (i, j)), shape=(n, len(free)))
+        self._reduced = (self._T.T @ self._K @ self._T).tocsc() if m else self._K
+        lu = diagonal_factors(self._reduced, "MMD_AT_PLUS_A") if K.symmetric else None
+        self._plain = lu is not None  # all pivots are on the diagonal
+        self._lu = splu(self._reduced) if lu is None else lu
 
     def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
         x, b, T = np.zeros(self._shape[1]), self._sizes * b, self._T

@@ -8,7 +8,6 @@ from copy import copy
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-import scipy.linalg
 from scipy import sparse
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
@@ -163,8 +162,13 @@ class StrainTangent:
                  multipliers: Array) -> None:
         self.system, self.free = system, np.nonzero(system.constraints.free)[0]
         self._at = u, load, t, load if t is None else t
-        parts = [_beam_rows(beam, system.histories.kernel(beam), u[s])
-                 for beam, s in zip(system.beams, system.slices)]
+        parts: list[Any] = []  # B and C B of each beam, sparse, and its weighted stresses
+        for beam, s in zip(system.beams, system.slices):
+            B, CB, stress = system.histories.kernel(beam).gradients(u[s])
+            j = np.broadcast_to(element_dofs(beam)[:, None], B.shape).ravel()
+            first = B.shape[2] * np.arange(stress.size + 1)
+            parts.append((*(sparse.csr_matrix((x.ravel(), j, first), shape=(stress.size, beam.N))
+                            for x in (B, CB)), stress.ravel()))
         rigid = system.N - sum(beam.N for beam in system.beams)
         if rigid:  # DOFs without strain
             parts.append((*2 * [sparse.csr_matrix((0, rigid))], np.zeros(0)))
@@ -268,14 +272,6 @@ class StrainTangent:
         """Numbers of free DOFs and of joint equations."""
         return self.J.shape[1], self.J.shape[0]
 
-    def require_independent(self) -> None:
-        """Raise SupportError if the joint equations are dependent."""
-        if not self.J.shape[0]:
-            return
-        R = scipy.linalg.qr(self.J.toarray().T, mode="r")[0]
-        if np.min(np.abs(np.diag(R))) < 1e-12 * np.max(np.abs(R)):
-            raise SupportError("the joints are dependent in this state")
-
     def stresses(self, du: Array) -> Array:
         """Stresses (k,) of a displacement du (N,) to first order."""
         return self._rows[1] @ du
@@ -296,16 +292,6 @@ class StrainTangent:
 def _joined(parts):
     """Block diagonal matrix."""
     return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
-
-
-def _beam_rows(beam, kernel, u):
-    """B and C B of a beam, sparse, and its weighted stresses."""
-    B, CB, stress = kernel.gradients(u)
-    n, stress = B.shape[2], stress.ravel()
-    j = np.broadcast_to(element_dofs(beam)[:, None], B.shape).ravel()
-    first = n * np.arange(len(stress) + 1)
-    return (*(sparse.csr_matrix((x.ravel(), j, first), shape=(len(stress), beam.N))
-              for x in (B, CB)), stress)
 
 
 def load_stiffness(system: Any, u: Array, load: float, t: float | None = None,

@@ -51,13 +51,15 @@ def repeated(constraints: Any) -> tuple[Array | None, bool]:
         rest = np.setdiff1d(np.arange(len(rows)), kept)
         if not len(rest):
             continue
-        u = _beside(c, start, move, rows, len(kept))
-        if u is None and _closed(c, start, rows, len(kept)) is None:
+        closed = _closed(c, start, rows, len(kept))
+        if closed is None:
             return None, False
-        if u is None:
+        u, V = closed
+        beside = _closed(c, u + c.coordinate_sizes * (move - V.T @ (V @ move)), rows, len(kept))
+        if beside is None:
             passing = True
             continue
-        for J1 in (J, _scaled(c, u)):
+        for J1 in (J, _scaled(c, beside[0])):
             A = J1[rows].toarray() / size[:, None]
             C = np.linalg.lstsq(A[kept][:, c.free].T, A[rest][:, c.free].T, rcond=None)[0].T
             gap = A[rest] - C @ A[kept]
@@ -110,16 +112,6 @@ def _basis(A):
         for _ in range(2):  # reorthogonalise
             A -= np.outer(A @ q, q)
     return np.sort(np.array(kept, dtype=int))
-
-
-def _beside(c, start, move, rows, rank):
-    """A position near the start in which equations of this rank are closed, or None."""
-    found = _closed(c, start, rows, rank)
-    if found is None:
-        return None
-    u, V = found
-    found = _closed(c, u + c.coordinate_sizes * (move - V.T @ (V @ move)), rows, rank)
-    return None if found is None else found[0]
 
 
 def _closed(c, u, rows, rank):

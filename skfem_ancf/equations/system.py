@@ -351,16 +351,12 @@ class System:
         self._carry(None, load)
         return self.histories.accept(u0, u, t)
 
-    def _factors(self, t, load):
-        """Load factors (k,) at a time, or in statics."""
-        t, tables = self.clock if t is None else t, self.backend.tables
-        return tables.static_factors(load) if t is None else load * tables.factors(
-            np.array([t]))[0]
-
     def _carry(self, t, load):
         """Let materials with a history have the eigenstrains of the loads."""
         if self.histories.lasting >= MATERIALS:
-            carry_eigenstrains(self.backend.tables.plain.loads, self._factors(t, load))
+            t, tables = self.clock if t is None else t, self.backend.tables
+            carry_eigenstrains(tables.plain.loads, tables.static_factors(load) if t is None else
+                               load * tables.factors(np.array([t]))[0])
 
     def strain_energy(self, u: Array, t: float = 1.0) -> float:
         """Strain energy of beams and potential of force elements."""

@@ -41,10 +41,12 @@ def modes(system: System, state: State, k: int) -> Modes:
     # stick, also if they slip.
     system = system.after(state.memory).sticking()
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
-    if tangent.size[0] <= DENSE:
-        tangent.require_independent()
-    M = _free_mass(system, tangent)
     n, m = tangent.size
+    if m and n <= DENSE:
+        R = scipy.linalg.qr(tangent.J.toarray().T, mode="r")[0]
+        refuse(np.min(np.abs(np.diag(R))) < 1e-12 * np.max(np.abs(R)),
+               "the joints are dependent in this state", error=SupportError)
+    M = _free_mass(system, tangent)
     k = _count(k, n - m)
     shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
     tangent.balance(M, shift)

@@ -156,7 +156,7 @@ class Increment:
         if not system.histories.path_dependent:
             backend = system.backend.linearised
         elif system.clock is None:
-            backend = system.backend.elastic_from(start.u)
+            backend = system.backend.after(system.backend.tables.elastic_from(start.u))
         if start.diverging or backend is None:
             return self.iterate(options=options)
         if not system.histories.path_dependent:
