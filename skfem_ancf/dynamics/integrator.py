@@ -20,8 +20,8 @@ from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate
 from .schemes import EnergyMomentum
 from .collocation import Collocation
 from .time_functions import SAMPLES, TimeFunctions, rates
-from .records import (FAILURES, Dampers, Interval, JointMotion, JointMotions, LowRankRows,
-                      Matrices, Multipliers, Rule, StageWork, StepData, StepState, Vectors, Work,
+from .records import (FAILURES, Dampers, Interval, JointMotion, LowRankRows,
+                      Matrices, Multipliers, Rule, StageWork, StepState, Vectors, Work,
                       acceleration_of_joints, drive_rate, mass_factor, solve_rows)
 from .stages import collocate, solve_for
 from .steps import factors, steps
@@ -148,7 +148,7 @@ class Integrator:
         # the tables of custom joints have no rates of functions of time
         custom = tables.plain.joints.custom > 0 and tables.motion_varies
         if m:
-            c, g = given.c[0, 0].copy(), np.vstack([given.g[0, 0, :1], given.g[0, 0]])
+            c, g = given.c[0, 0].copy(), given.g[0, 0]
             gap, J = np.abs(s.constraints.constraint(y.u, at)), s.constraints.full_jacobian(y.u, at)
             if np.any(gap > 1e-8 * tables.plain.joints.sizes):
                 raise SupportError("the joints are not closed at the start: the largest gap is "
@@ -229,7 +229,10 @@ class Integrator:
         lasting = s.histories.lasting
         rows, multipliers = np.empty((n, 4, s.N)), np.empty((n, 2, self.m))
         memories = np.full((n, 2 + (s.histories.values.size if lasting else 0)), np.nan)
-        kernel, data, points = self._begin(y, dt, n, given)
+        kernel, goes_on, ahead, points = self._begin(y, dt, n)
+        data = Interval._make([float(dt), goes_on, ahead, *(  # steps and instants in one axis
+            np.ascontiguousarray(x).reshape(len(x) * x.shape[1], *x.shape[2:]) for x in given),
+            int(s.backend.tables.motion_varies)])
         done = self._call(kernel, y, dt, (rows, memories[:, :2]), self._rule, data, self._state,
                           self._work, memories, rows, multipliers, points)
         history = memories[:, 2:] if lasting or y.history is None else np.array([y.history] * done)
@@ -250,19 +253,15 @@ class Integrator:
 
         return Motions({name: x[:done] for name, x in zip(COLUMNS, columns)}, memory)
 
-    def _begin(self, y, dt, n, given):
-        """The kernel, its functions of time, and an array for what a step has at its points."""
+    def _begin(self, y, dt, n):
+        """The kernel, 1 if it continues a step, its extrapolation, and an array for what steps have
+        at their points."""
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
-        joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
-                              int(self.system.backend.tables.motion_varies))
-        return steps, StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
-                               given.factors[:, -1].copy(), given.supports[:, -1].copy(),
-                               joints), np.empty((n, 0, 0))
+        return steps, 0, np.zeros((0, 0)), np.empty((n, 0, 0))
 
     def _call(self, function: Callable, y: Motion, dt: float, out: tuple[Array, Array],
               *args: Any) -> int:
@@ -475,7 +474,7 @@ class StageIntegrator(Integrator):
             np.zeros((2 * k, b, N)), np.zeros((2, rows, rows)), np.zeros((2, m, N)),
             np.zeros((m, m)), np.zeros(m), D, method])
 
-    def _begin(self, y, dt, n, given):
+    def _begin(self, y, dt, n):
         s, w, table, memory = self.system, self._work, self.scheme.table, y.memory or {}
         w.y[0], w.y[1], w.first[:] = y.u, y.v, y.multipliers
         ahead = table.method.ahead
@@ -485,12 +484,7 @@ class StageIntegrator(Integrator):
             ahead = ahead if dt == y.before else table.ahead(dt / y.before)
         else:
             w.guess[:] = 0.5 * (dt * table.points[:, None])**2 * y.acceleration
-        times, factors, supports, c, g = (  # steps and instants in one axis
-            np.ascontiguousarray(x).reshape(len(x) * x.shape[1], *x.shape[2:]) for x in (
-                given.times, given.factors, given.supports, given.c, given.g[:, :, [0, 0, 1, 2]]))
-        joints = JointMotions(c, g, int(s.backend.tables.motion_varies))
-        return collocate, Interval(float(dt), int("points" in memory), ahead, times, factors,
-                                   supports, joints), np.empty((n, len(w.U), s.N + self.m))
+        return collocate, int("points" in memory), ahead, np.empty((n, len(w.U), s.N + self.m))
 
     def filtered(self, du: Array) -> Array:
         s, w = self.system, self._work

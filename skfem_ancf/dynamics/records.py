@@ -103,17 +103,9 @@ _SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
 class JointMotion(NamedTuple):
     """Time-dependent terms of the joints at one instant, see :mod:`skfem_ancf.actions.tables`."""
 
-    c: F2  # c at the end of a step, and its first two rates, (3, m)
-    g: F2  # g there, g where the joints act, and the first two rates of g, (4, k)
+    c: F2  # c and its first two rates, (3, m)
+    g: F2  # the same of g, (3, k)
     drives: int  # 1 if a joint moves
-
-
-class JointMotions(NamedTuple):
-    """The same at several instants, a row for each, or one row if constant."""
-
-    c: F3
-    g: F3
-    drives: int
 
 
 @apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1)
@@ -121,7 +113,7 @@ def drive_rate(joints, motion, t, dt, u, out):
     """The partial rate of Phi, c' + g' . u, at the end t of a step of dt."""
     copy(motion.c[1], out)
     if joints.custom == 0:
-        add_products(out, joints.gk, motion.g[2], u, joints.gi)
+        add_products(out, joints.gk, motion.g[1], u, joints.gi)
     elif motion.drives > 0:
         _add_differences(joints, t, dt, u, u, PARTS / dt, 0.0, 0.0, out)
 
@@ -129,11 +121,11 @@ def drive_rate(joints, motion, t, dt, u, out):
 @apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1, F1)
 def acceleration_of_joints(joints, motion, t, dt, u, v, out):
     """The second rate of Phi without accelerations: c'' + v . H v + g'' . u + 2 g' . v."""
-    g = motion.g[2]
+    g = motion.g[1]
     copy(motion.c[2], out)
     if joints.custom == 0:
         add_triples(out, joints.hk, joints.hv, v, joints.hi, v, joints.hj)
-        add_products(out, joints.gk, motion.g[3], u, joints.gi)
+        add_products(out, joints.gk, motion.g[2], u, joints.gi)
         add_products(out, joints.gk, g, v, joints.gi)
         add_products(out, joints.gk, g, v, joints.gi)
     else:
@@ -183,15 +175,19 @@ class Matrices(NamedTuple):
     dampers: Dampers
 
 
-class StepData(NamedTuple):
-    """Functions of time for a block of steps; one row if constant."""
+class Interval(NamedTuple):
+    """Prescribed functions at p instants of s steps; one row if constant. The last instant is the
+    end of the step, the others are the points of collocation, or that of the equation of motion."""
 
-    dt: float
-    times: F2  # ends of the steps, and instants of their equations of motion, (n, 2)
-    factors: F2  # of the loads, (n, l)
-    ends: F2  # the same at the ends of the steps
-    supports: F3  # displacement, velocity, acceleration of fixed DOFs, else 0, (n, 3, N)
-    joints: JointMotions
+    h: float  # step size
+    begun: int  # of collocation: 1 if there is a previous step
+    ahead: F2  # and Method.ahead for the first step
+    times: F1  # (s p,)
+    factors: F2  # of the loads, (s p, l)
+    constrained: F3  # displacement, velocity and acceleration of fixed DOFs, else 0, (s p, 3, N)
+    c: F3  # of the joints, (s p, 3, m)
+    g: F3  # (s p, 3, k)
+    drives: int  # 1 if a joint moves
 
 
 class Step(NamedTuple):
@@ -200,10 +196,11 @@ class Step(NamedTuple):
     dt: float
     t: float  # end of the step
     t_force: float  # instant of the equation of motion
-    factors: F1  # as in StepData
-    ends: F1
-    supports: F2
+    factors: F1  # of the loads then
+    ends: F1  # and at the end
+    supports: F2  # displacement, velocity, acceleration of fixed DOFs, else 0, (3, N)
     joints: Annotated[JointMotion, MADE]
+    g: F1  # of the joints, where they act
     mass_factor: float
     damping_factor: float
     stiffness_factor: float
@@ -285,7 +282,7 @@ class StepState(NamedTuple):
     guess: I1  # 1 while margins alone say that members do not touch
 
 
-# named tuples of collocation: coefficients, prescribed functions, work arrays
+# named tuples of collocation: coefficients, work arrays
 
 class Method(NamedTuple):
     """Coefficients of a method of n points and k eigenvalues, one of each conjugate pair. Complex
@@ -299,18 +296,6 @@ class Method(NamedTuple):
     to: F3  # rows of T^-1, (2, k, n)
     back: F3  # columns of T, doubled for pairs, (2, n, k)
     ahead: F2  # extrapolation from c to 1 + c by monomials of degree 2 and above, (n, n)
-
-
-class Interval(NamedTuple):
-    """Prescribed functions at the points and the end of s steps; one row if constant."""
-
-    h: float  # step size
-    begun: int  # 1 if there is a previous step
-    ahead: F2  # Method.ahead for the first step
-    times: F1  # (s (n + 1),)
-    factors: F2  # of the loads, (s (n + 1), l)
-    constrained: F3  # displacement, velocity and acceleration of fixed DOFs, (s (n + 1), 3, N)
-    joints: JointMotions
 
 
 class StageWork(NamedTuple):
@@ -379,16 +364,19 @@ def mass_factor(rule, dt):
 
 
 @source
+def motion_at(s, k):
+    """The JointMotion at an instant of an Interval."""
+    return JointMotion(row_of(s.c, k), row_of(s.g, k), s.drives)
+
+
+@source
 def step_of(joints, rule, block, n):
     """The :class:`Step` number n."""
-    # the factor of D in the iteration matrix is dv / du_1
-    damping_factor = (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / block.dt
-    c, g = block.joints.c, block.joints.g
+    at, end, h = 2 * n, 2 * n + 1, block.h
     constant = joints.hk.size == 0 and joints.custom == 0
-    kept = constant and g.shape[0] == 1 and n > 0
-    joints_now = JointMotion(row_of(c, n), row_of(g, n), block.joints.drives)
-    return Step(block.dt, block.times[n, 0], block.times[n, 1],
-                row_of(block.factors, n), row_of(block.ends, n), row_of(block.supports, n),
-                joints_now,
-                mass_factor(rule, block.dt), damping_factor,
-                0.5 if rule.conserving > 0 else 1.0, constant, kept)
+    damping_factor = (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / h  # dv / du_1
+    return Step(h, block.times[end], block.times[at], row_of(block.factors, at),
+                row_of(block.factors, end), row_of(block.constrained, end), motion_at(block, end),
+                row_of(block.g, at)[0], mass_factor(rule, h), damping_factor,
+                0.5 if rule.conserving > 0 else 1.0, constant,
+                constant and block.g.shape[0] == 1 and n > 0)

@@ -20,8 +20,8 @@ from ..core import indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
                                      SINGULAR, correction_size, judged, motion_size,
                                      noise_of_step)
-from .records import (ITERATIONS, JointMotion, acceleration_of_joints, add_damping,
-                      damping_force, drive_rate, row_of, settle)
+from .records import (ITERATIONS, acceleration_of_joints, add_damping, damping_force, drive_rate,
+                      motion_at, row_of, settle)
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
 #: steps.
@@ -105,7 +105,7 @@ def _rows(e, matrices, s, w, at):
     """Set the low-rank rows at the mean of the points, and the coupling of those of no joint."""
     m, forces, t = w.l.shape[1], e.forces, s.times[at]
     if m > 0:
-        joint_directions(e.joints, row_of(s.joints.g, at)[0], t, w.origins[0], w.J[:m])
+        joint_directions(e.joints, row_of(s.g, at)[0], t, w.origins[0], w.J[:m])
     for a in range(matrices.rows.P.shape[0]):
         copy(matrices.rows.P[a], w.J[m + a])
     for a in range(w.J.shape[0]):
@@ -318,7 +318,7 @@ def _end(e, matrices, method, s, w, state, step):
         copy(w.U[n - 1], u)
         copy(w.V[n - 1], v)
         copy(w.W[n - 1], a)
-    constrained, motion = row_of(s.constrained, first + n), motion_at(s.joints, first + n)
+    constrained, motion = row_of(s.constrained, first + n), motion_at(s, first + n)
     joined = w.shares.size > 0
     for i in indices(u.size):
         u[i] = u[i] * e.free[i] + constrained[0, i]
@@ -366,7 +366,7 @@ def _close(e, matrices, s, w, motion, t, step):
     """Project u onto the joints in the mass norm, and v onto their rates."""
     u, v, g, x = w.y[0], w.y[1], motion.g[0], w.x[3]
     bends = e.joints.hk.size > 0 or e.joints.custom > 0  # J depends on u or t
-    turns = step == 0 or s.joints.g.shape[0] > 1
+    turns = step == 0 or s.g.shape[0] > 1
     for k in range(CLOSINGS):
         joint_directions(e.joints, g, t, u, w.end[0])
         constraint(e.joints, motion.c[0], g, t, u, w.shares)
@@ -428,12 +428,6 @@ def _states(free, method, s, w, step, rates):
 
 
 @source
-def motion_at(joints, k):
-    """The JointMotion at a point."""
-    return JointMotion(row_of(joints.c, k), row_of(joints.g, k), joints.drives)
-
-
-@source
 def _internal(e, matrices, method, s, w, state, step):
     """Internal forces of all points, into R; independent stresses include viscous ones."""
     U, f, missing, constitutive = flat_points(w.U), flat_points(w.R), w.missing, w.constitutive
@@ -470,7 +464,7 @@ def _residual(e, matrices, method, s, w, state, step, k):
     multiply(matrices.M, w.W[k], scratch)
     add_multiple(1.0, scratch, f)
     if w.gaps.shape[1] > 0:
-        gap, l, motion = w.gaps[k], w.l[k], motion_at(s.joints, at)
+        gap, l, motion = w.gaps[k], w.l[k], motion_at(s, at)
         g = motion.g
         add_joint_force(e.joints, g[0], t, u, l, f)
         drive_rate(e.joints, motion, t, s.h * method.points[k], u, gap)

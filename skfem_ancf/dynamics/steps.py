@@ -121,7 +121,7 @@ def directions(e, matrices, rule, s, w, state):
         clear(flat)
         call_custom(JOINTS, e.joints.custom, np.int64(5), s.t_force, 1.0, w.x.u, w.y[0], flat)
     else:
-        joint_directions(e.joints, s.joints.g[1], s.t_force, w.x.middle, w.J[0])
+        joint_directions(e.joints, s.g, s.t_force, w.x.middle, w.J[0])
     joint_directions(e.joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
@@ -138,7 +138,7 @@ def residual(e, matrices, rule, s, w, state):
         R[i] = R[i] - f[i] - scratch[i]
     if rule.solver > 0:
         clear(scratch)
-        add_joint_force(e.joints, s.joints.g[1], s.t_force, w.x.middle, w.m.l, scratch)
+        add_joint_force(e.joints, s.g, s.t_force, w.x.middle, w.m.l, scratch)
         add_multiple(-1.0, scratch, R)
     else:
         subtract_rows(w.J[0], w.m.l, R)

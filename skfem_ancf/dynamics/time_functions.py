@@ -91,7 +91,7 @@ class TimeFunctions:
         if s.constraints.moves:
             supports[..., s.constraints.fixed] = moving(s.constraints.values_at)
         c, g = tables.still
-        c, g = c[:, None], g[:, None, 1:]
+        c, g = c[:, None], g[:, None]
         if tables.motion_varies and not tables.plain.joints.custom:
             found = moving(tables.driven)
             c = found[..., :s.constraints.m]

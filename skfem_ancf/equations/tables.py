@@ -395,15 +395,14 @@ class Tables:
 
     @cached_property
     def still(self) -> tuple[Array, Array]:
-        """Constant c and g with two rates, (1, 3, m) and (1, 4, k); zero where time-dependent. g
-        occurs twice: at the end of a step and where the joints act."""
+        """Constant c and g with two rates, (1, 3, m) and (1, 3, k); zero where time-dependent."""
         s, joints, first = self.system, self.plain.joints, np.zeros(1)
-        c, g = np.zeros((1, 3, s.constraints.m)), np.zeros((1, 4, len(joints.gk)))
+        c, g = np.zeros((1, 3, s.constraints.m)), np.zeros((1, 3, len(joints.gk)))
         if s.constraints.m and not joints.custom:
             if not self.motion_varies:
                 c[:, 0] = s.constraints.offsets(first)
             if not self.turns:
-                g[:, :2] = self.slopes(first)
+                g[:, 0] = self.slopes(first)
         return c, g
 
 

@@ -19,7 +19,6 @@ from .continuation import continuation
 from .increment import Increment, Options, Route
 from .iteration import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
-from .without_contact import solved_without_contact
 
 logger = logging.getLogger(__name__)
 
@@ -163,7 +162,8 @@ class Search:
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""
-        found = solved_without_contact(self.system, self.route.u, self._memory, self._free)
+        found = strategies.solved_without_contact(self.system, self.route.u, self._memory,
+                                                  self._free)
         if found is not None:
             return found
         for name, solve in self._strategies():
