@@ -150,10 +150,9 @@ class Integrator:
         if m:
             c, g = given.c[0, 0].copy(), given.g[0, 0]
             gap, J = np.abs(s.constraints.constraint(y.u, at)), s.constraints.full_jacobian(y.u, at)
-            if np.any(gap > 1e-8 * tables.plain.joints.sizes):
-                raise SupportError("the joints are not closed at the start: the largest gap is "
-                                   f"{gap.max():.3g}. Change the positions of the beams, or start "
-                                   "from a static solution (start=)")
+            refuse(np.any(gap > 1e-8 * tables.plain.joints.sizes), "the joints are not closed at "
+                   "the start: the largest gap is {:.3g}. Change the positions of the beams, or "
+                   "start from a static solution (start=)", gap.max(), error=SupportError)
             if custom:
                 c[1:] = rates(lambda times: np.array([
                     s.constraints.constraint(y.u, x) for x in times]), t, dt, ahead, self.limit)

@@ -14,7 +14,8 @@ from ..actions.joints.base import IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam import Beam, RigidBody
 from ..core.band import dense
-from ..core import Array, InputError, ModelWarning, SupportError, cached_property, is_builtin, shown
+from ..core import (Array, InputError, ModelWarning, SupportError, cached_property, is_builtin,
+                    refuse, shown)
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
 from .rank import DENSE, DEPENDENT, FREE, groups
 
@@ -482,13 +483,12 @@ class Constraints:
 
     def free_rigid_motions(self) -> list[str]:
         """Descriptions of unconstrained rigid motions."""
-        return free_rigid_motions(self, self._at_rest, self._stiffness)
+        return free_rigid_motions(self)
 
     def require_supports(self) -> None:
         """Raise SupportError if a rigid motion is unconstrained, or joints are dependent."""
         self.require_independent_joints()
-        if self.missing_supports:
-            raise SupportError(self.missing_supports)
+        refuse(self.missing_supports, self.missing_supports, error=SupportError)
 
     @cached_property
     def missing_supports(self) -> str:

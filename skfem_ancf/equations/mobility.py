@@ -1,6 +1,5 @@
 """Unconstrained rigid motions, redundant joints, and their description."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -142,14 +141,18 @@ def who(members: Any, k: int) -> str:
     return "" if len(members) == 1 else f" of beam {member.name or k}"
 
 
-def free_rigid_motions(constraints: Any, joints: Any,
-                       stiffness: Callable[[], Any] | None) -> list[str]:
+def free_rigid_motions(constraints: Any) -> list[str]:
     """Descriptions of the rigid motions that no support, joint or force element constrains."""
-    # ``joints`` is the Jacobian (m, N) in the reference configuration; ``stiffness`` returns the
-    # sparse stiffness of force elements there, or is None.
-    c = constraints
-    if len(c.members) == 1 and _held(c):
-        return []
+    c, joints, stiffness = constraints, constraints._at_rest, constraints._stiffness
+    if len(c.members) == 1:
+        # a node of the only member is held, and something that turns about it
+        (member,), held, sizes = c.members, set(c.fixed.tolist()), c.coordinate_sizes
+        node = next((d for d in held if d % member.nd == 0 and d + 1 in held), None)
+        q = member.q0_local
+        if node is not None and any(
+                abs(q[d ^ 1] - (q[node + (d ^ 1) % 2] if d % member.nd < 2 else 0.0))
+                > HELD * sizes[d] for d in held):
+            return []
     motions, of_joints, bodies = _motions(c, joints)
     parts = [motions[c.fixed], of_joints]
     if stiffness is not None:
@@ -161,18 +164,6 @@ def free_rigid_motions(constraints: Any, joints: Any,
     free = null_space(unit_rows(np.concatenate(parts) if dense else sparse.vstack(parts)))
     bodies = bodies() if len(free) else []
     return [_describe(v, bodies) for v in free]
-
-
-def _held(c):
-    """True if supports hold a node of the only member, and something that turns about it."""
-    (member,), held, sizes = c.members, set(c.fixed.tolist()), c.coordinate_sizes
-    node = next((d for d in held if d % member.nd == 0 and d + 1 in held), None)
-    if node is None:
-        return False
-    q = member.q0_local
-    levers = ((q[d ^ 1] - (q[node + (d ^ 1) % 2] if d % member.nd < 2 else 0.0), sizes[d])
-              for d in held)
-    return any(abs(lever) > HELD * size for lever, size in levers)
 
 
 def _motions(c, joints):

@@ -185,14 +185,11 @@ class Descent:
         if found is not None:
             self.shift = 0.0
             return found
-        found = correction(shift)
-        if found is None:  # increase
-            while found is None and shift < 1e6 * scale:
-                shift *= 10.0
-                found = correction(shift)
-            self.shift = shift
-            return found
-        while shift > 10.0 * least:  # decrease
+        found, grown = correction(shift), False
+        while found is None and shift < 1e6 * scale:
+            shift, grown = 10.0 * shift, True
+            found = correction(shift)
+        while found is not None and not grown and shift > 10.0 * least:
             less = correction(0.1 * shift)
             if less is None:
                 break
