@@ -41,11 +41,8 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     """Factorise the iteration matrices at the mean of the points; False on failure."""
     origin, f, S, yes = w.origins[0], w.x[0], w.stresses, w.x.size > 0
     at, e.span[0] = step * (method.points.size + 1), s.h
-    clear(origin)
-    for k in range(method.points.size):
-        add_multiple(method.weights[k], w.U[k], origin)
-    for k in range(1, method.points.size):
-        copy(origin, w.origins[k])
+    np.dot(method.weights, w.U, origin)
+    w.origins[1:] = origin
     if state.mixed_steps[0] > 0:
         body_mean_stress(e.body, e.copies, method.weights, w.independent, S[1])
     else:
@@ -212,14 +209,8 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
                     s.factors, (k + 1) * (method.points.size + 1) - 1))
             settle(e, (t, t), 0.0, w.before[0], w.y[0], w.y[1], state, memories[k, 2:])
         state.last_dt[0], state.mixed_steps[0] = s.h, max(0, state.mixed_steps[0] - 1)
-        for j in range(4):
-            copy(w.y[min(j, 2)], rows[k, j])
-        for j in range(method.points.size):
-            copy(w.U[j], points[k, j, :e.free.size])
-            copy(w.l[j], w.first[j])
-            copy(w.l[j], points[k, j, e.free.size:])
-        for j in range(2):
-            copy(w.shares, multiplier_rows[k, j])
+        rows[k, :3], rows[k, 3], multiplier_rows[k], w.first[:] = w.y, w.y[2], w.shares, w.l
+        points[k, :, :e.free.size], points[k, :, e.free.size:] = w.U, w.l
         memories[k, 1] = 1.0  # what points lead through
         memories[k, 0] = state.dissipated[0]  # last: the step is complete
     return rows.shape[0]
@@ -231,10 +222,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     n, scratch, status, u0 = method.points.size, w.x[0], GO_ON, w.y[0]
     rates = w.gaps.size > 0 or matrices.dampers.active > 0
     multiply(matrices.M, u0, scratch)
-    largest = 0.0
-    for k in range(method.values.shape[1]):
-        a, b = method.values[0, k], method.values[1, k]
-        largest = max(largest, (a * a + b * b) / (s.h * s.h))
+    largest = np.max(method.values[0]**2 + method.values[1]**2) / (s.h * s.h)
     reference = motion_size(state.energy[0])
     noise = noise_of_step(rule, 1.0, largest, abs(np.dot(u0, scratch)))
     state.fresh[0], state.correction[0] = 0, -1.0
@@ -272,9 +260,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
                             w.independent)
             if matrices.dampers.viscous > 0:  # and by the rates of the correction R
                 for k in range(n):
-                    clear(scratch)
-                    for j in range(n):
-                        add_multiple(method.first[k, j] / s.h, w.R[j], scratch)
+                    np.dot(method.first[k] / s.h, w.R, scratch)
                     add_viscous_stress(e.viscous, e.body, e.copies, k, w.origins[0], scratch,
                                        w.stresses, w.independent)
     _states(e.free, method, s, w, step, True)
@@ -390,12 +376,9 @@ def _meet(mass, free, w, x, anew):
 def _start(e, matrices, method, s, w, state, step):
     """Set the initial guess; in the mixed iteration from the mean acceleration of the last step."""
     # A polynomial through the vibrations of a stiff beam extrapolates badly.
-    for k in range(w.Z.shape[0]):
-        copy(w.guess[k], w.Z[k])
-        copy(w.first[k], w.l[k])
+    w.Z[:], w.l[:] = w.guess, w.first
     if state.mixed_steps[0] > 0:
-        for k in range(w.R.shape[0]):
-            copy(w.y[0], w.R[k])
+        w.R[:] = w.y[0]
         body_stress(e.copies, flat_points(w.R), w.independent)
         if step > 0 or s.begun > 0:
             v0, v = w.y[1], w.before[1]
@@ -408,23 +391,19 @@ def _start(e, matrices, method, s, w, state, step):
 @source
 def _states(free, method, s, w, step, rates):
     """Set displacements, accelerations and, if ``rates``, velocities of the points."""
-    u0, v0, n, N = w.y[0], w.y[1], method.points.size, free.size
-    for k in range(n):
+    u0, v0 = w.y[0], w.y[1]
+    np.dot(method.second, w.Z, w.W)
+    if rates:
+        np.dot(method.first, w.Z, w.V)
+    for k in range(method.points.size):
         U, V, W, Z, c = w.U[k], w.V[k], w.W[k], w.Z[k], s.h * method.points[k]
-        constrained = row_of(s.constrained, step * (n + 1) + k)
-        for i in indices(N):
+        constrained = row_of(s.constrained, step * (method.points.size + 1) + k)
+        for i in indices(free.size):
             U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + constrained[0, i]
-        clear(W)
-        for j in range(n):
-            add_multiple(method.second[k, j] / (s.h * s.h), w.Z[j], W)
-        for i in indices(N):
-            W[i] = W[i] * free[i] + constrained[2, i]
+            W[i] = W[i] / (s.h * s.h) * free[i] + constrained[2, i]
         if rates:
-            copy(v0, V)
-            for j in range(n):
-                add_multiple(method.first[k, j] / s.h, w.Z[j], V)
-            for i in indices(N):
-                V[i] = V[i] * free[i] + constrained[1, i]
+            for i in indices(free.size):
+                V[i] = (v0[i] + V[i] / s.h) * free[i] + constrained[1, i]
 
 
 @source
@@ -477,16 +456,13 @@ def _residual(e, matrices, method, s, w, state, step, k):
 def _correct(e, method, s, w, state):
     """Correct Z and the multipliers; R becomes the correction. False for dependent joints."""
     # V is used as work array.
-    n, N, m, b = method.points.size, e.free.size, w.l.shape[1], w.J.shape[0]
+    n, m, b = method.points.size, w.l.shape[1], w.J.shape[0]
     D, dl, x, y, r, q = w.V, w.dl, w.x[0], w.x[1], w.r, w.q
     clear(flat_points(D))
     clear(flat_points(dl))
     for k in range(method.values.shape[1]):
-        clear(x)
-        clear(y)
-        for j in range(n):
-            add_multiple(method.to[0, k, j], w.R[j], x)
-            add_multiple(method.to[1, k, j], w.R[j], y)
+        np.dot(method.to[0, k], w.R, x)
+        np.dot(method.to[1, k], w.R, y)
         solve_for(w, k, x, y)
         if b > 0 and not join(method, s, w, k, r, q, x, y):
             return False
@@ -502,9 +478,6 @@ def _correct(e, method, s, w, state):
     state.last_correction[0] = state.correction[0]
     state.correction[0] = correction_size(e, flat_points(w.R), flat_points(D),
                                           flat_points(w.gaps), flat_points(dl))
-    for j in range(n):
-        Z, R, d = w.Z[j], w.R[j], D[j]
-        for i in indices(N):
-            Z[i] += d[i]
-            R[i] = d[i]
+    add_multiple(1.0, flat_points(D), flat_points(w.Z))
+    copy(flat_points(D), flat_points(w.R))
     return True

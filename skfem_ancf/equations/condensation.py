@@ -46,11 +46,6 @@ class Group(NamedTuple):
     elements: int  # elements of a member
 
     @property
-    def ends(self) -> Array:
-        """Numbers of the first and last ends, shape (2, M)."""
-        return 2 * self.members + np.array([[0], [1]])
-
-    @property
     def places(self) -> Array:
         """DOFs of each member, shape (M, (elements + 1) nd)."""
         return self.first[:, None] + np.arange((self.elements + 1) * self.nd)
@@ -78,7 +73,9 @@ class Condensed:
         nodes: Nodes = system.constraints.frame
         self._K, self.at = K, (np.zeros(system.N), np.zeros(system.constraints.m))
         self.nodes, self.groups = nodes, groups_of(system.beams, system.slices)
-        self._bases = [[_Basis(nodes, group, ends) for ends in group.ends] for group in self.groups]
+        # both ends of each member, numbered one after the other
+        self._bases = [[_Basis(nodes, group, 2 * group.members + end) for end in (0, 1)]
+                       for group in self.groups]
         unknown = ~nodes.fixed  # x, y and the rotation of each node
         unknown[np.setdiff1d(np.arange(len(unknown)), nodes.nodes)] = False  # no line ends there
         rigid = np.zeros(len(unknown), dtype=bool)

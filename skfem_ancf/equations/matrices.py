@@ -212,21 +212,17 @@ class StrainTangent:
              + self.system.constraints.curvature(u, time, multipliers))
         return S[self.free][:, self.free]
 
-    def response(self) -> tuple[Array, Array, Array]:
-        """Linear response to the full load: du (N,), stress (k,), multipliers (m,)."""
-        system, u = self.system, self._at[0]
-        du = np.zeros(system.N)
-        du[system.constraints.fixed] = system.constraints.values(1.0)
-        rest = (system.external_force(u)[self.free] - self._element_force()
-                - self.B.T @ (self._rows[1] @ du))
-        gap = -system.constraints.constraint(u + du, 1.0)
-        return self._responding(rest, du, gap[:, None])
-
-    def added(self, force: Array) -> tuple[Array, Array, Array]:
-        """As :meth:`response`, to a force (N,) on top of the state."""
-        return self._responding(force[self.free], np.zeros(self.system.N))
-
-    def _responding(self, rest, du, gap=None):
+    def response(self, force: Array | None = None) -> tuple[Array, Array, Array]:
+        """Linear response to the full load: du (N,), stress (k,), multipliers (m,); or to a force
+        (N,) on top of the state."""
+        system, u, du, gap = self.system, self._at[0], np.zeros(self.system.N), None
+        if force is None:
+            du[system.constraints.fixed] = system.constraints.values(1.0)
+            rest = (system.external_force(u)[self.free] - self._element_force()
+                    - self.B.T @ (self._rows[1] @ du))
+            gap = -system.constraints.constraint(u + du, 1.0)[:, None]
+        else:
+            rest = force[self.free]
         x, multipliers = Inverse(self).solve_both(rest[:, None], gap)
         du[self.free] = x[:, 0]
         return du, self.stresses(du), multipliers[:, 0]

@@ -232,11 +232,6 @@ def weak_at_rest(system: Any) -> str:
             "'continuum', a smaller nu or a smaller order")
 
 
-def potential(system: Any, u: Array, load: float, turned: Array | None = None) -> float:
-    """Total potential at u (N,): strain energy minus the work of the loads."""
-    return system.strain_energy(u, load) + load * system.load_potential(u, turned=turned)
-
-
 def largest_displacement(system: Any, du: Array) -> float:
     """The largest displacement of a node, for displacements (..., N)."""
     places = position_weights(system).nonzero()[0]

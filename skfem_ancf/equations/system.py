@@ -270,7 +270,9 @@ class System:
         return MassSolver(self)
 
     @shared
-    def _free(self):
+    def without_contact(self) -> "System | None":
+        """The equations without contact of members, after the same histories; None if there is
+        none."""
         given, elements = list(self._given), self._given[6]
         given[6] = [e for e in elements if not hasattr(e, "broad_search")]
         if len(given[6]) == len(elements):
@@ -279,13 +281,6 @@ class System:
         other.histories = self.histories.of(other.forces)
         other.forces = other.histories.forces
         return other
-
-    @property
-    def without_contact(self) -> "System | None":
-        """The equations without contact of members, after the same histories; None if there is
-        none."""
-        free = self._free
-        return free if free is None or self.clock is None else free.at(self.clock)
 
     @shared
     def starts_untouched(self) -> bool:

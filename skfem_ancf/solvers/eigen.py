@@ -299,7 +299,7 @@ def _linear_response(system, state):
     tangent = StrainTangent(state.system.after(state.memory), state.u, state.load, state.t,
                             state.multipliers)
     loads = StrainTangent(system, state.u, 0.0, None, state.multipliers)
-    return tangent, loads, *tangent.added(system.external_force(state.u))
+    return tangent, loads, *tangent.response(system.external_force(state.u))
 
 
 def _prestressed(system):

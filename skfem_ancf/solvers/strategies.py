@@ -30,7 +30,7 @@ from ..core import NO_FACTORS, Array, ConvergenceError, handle_of
 from ..core.band import fix
 from ..equations.evaluation import motion_is_clear
 from ..equations.stability import (inverse_on_positions, largest_displacement, position_weights,
-                                   potential, response, verdict)
+                                   response, verdict)
 from ..equations.system import System
 from .continuation import Point, Tracer
 from .iteration import Equilibrium, LoadStepFailed, TooManyIterations, StaticResult
@@ -244,8 +244,9 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
         if not abs(ahead) > 1e-6 * descent.product(v, v):  # across the way back
             turns = Turns(system)
             near = turns.begin(u)
-            here, up, down = (potential(system, x, load, turns.follow(near, x[None])[0])
-                              for x in (u, u + v, u - v))
+            here, up, down = (  # total potentials
+                system.strain_energy(x, load) + load * system.load_potential(
+                    x, turned=turns.follow(near, x[None])[0]) for x in (u, u + v, u - v))
             ahead = down - up
             if not abs(ahead) > 1e-6 * abs(up + down - 2.0 * here):  # symmetric: either side
                 ahead = v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))]
@@ -448,7 +449,7 @@ def solved_without_contact(system: System, u: Array, memory: Array | None,
     try:
         if not (here.starts_untouched and not u.any() or here.backend.of(motion_is_clear)(u[None])):
             return None
-        result = solve(free)
+        result = solve(free if system.clock is None else free.at(system.clock))
         motion, run = motion_between(here, u, result.u), here.backend.of(motion_is_clear)
         if motion is None:
             return None
