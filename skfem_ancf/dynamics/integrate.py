@@ -21,10 +21,6 @@ from .run import Run, TimeStepFailed, task_of
 from .schemes import SCHEMES, get_scheme
 from .sensors import Sensor
 
-#: Interval in steps between checks for inverted elements.
-LOOKED = 16
-#: Part of the energy that collocation may bring in where materials yield.
-GAIN = 0.02
 #: Memory limit of the dense constraint Jacobians, in gigabytes.
 LARGEST = 2.0
 #: Kind of the files.
@@ -104,7 +100,7 @@ def follow(run: Run, file: "Checkpoint | None" = None, progress: bool | None = N
         ends = History(system, run.scheme, columns, (None, None), history.sensors)
         gain = float(np.diff(ends.total_energy + ends.dissipated)[0])
         size = float(np.max(ends.kinetic_energy + ends.strain_energy))
-        if gain > GAIN * size:
+        if gain > 0.02 * size:
             texts.append(
                 f"{run.scheme!r} brought in {gain / size:.0%} of the energy: materials yielded in "
                 "steps that do not resolve the waves of stress, and the motion is wrong. Use "
@@ -127,7 +123,7 @@ def _go(run, file, progress):
                 run.advance()
                 bar.update(run.y.t - before)
                 if inverted is None and (run.steps >= looked or run.done):
-                    looked, u = run.steps + LOOKED, run.y.u
+                    looked, u = run.steps + 16, run.y.u  # now and then
                     if system.inverted(u) or system.folded(u):
                         inverted = run.y.t
                 if file is not None:

@@ -30,8 +30,6 @@ from .steps import factors, steps
 logger = logging.getLogger(__name__)
 
 DEPTH = 6  # how often a step is halved
-#: Factors of the step size that are tried to step past a singular position of the joints.
-LEAPS = 1.5, 2.3, 3.7, 6.1, 11.0, 23.0
 #: Approximate iterations of a step, by which work in NumPy is counted.
 OF_STEP = 3
 #: Names in checkpoints of the entries beside the band.
@@ -366,7 +364,7 @@ class Integrator:
             other.limit = self.limit
             begin = other.start(y.u, y.v, y.t, dt)
             begin.dissipated = y.dissipated
-        for factor in LEAPS:
+        for factor in (1.5, 2.3, 3.7, 6.1, 11.0, 23.0):  # times the step size
             with suppress(TimeStepFailed):
                 return other.attempt(begin, factor * dt)
         return None
@@ -445,10 +443,6 @@ def _couplings(system):
     return i[kept], j[kept], values[kept]
 
 
-#: Samples of functions of time in a step of collocation: Chebyshev points.
-CHEBYSHEV = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
-
-
 class StageIntegrator(Integrator):
     """Integrates a system by collocation, as an Integrator."""
 
@@ -456,7 +450,8 @@ class StageIntegrator(Integrator):
 
     @cached_property
     def _functions(self):
-        return TimeFunctions(self.system, np.append(self.scheme.points, 1.0), CHEBYSHEV)
+        chebyshev = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
+        return TimeFunctions(self.system, np.append(self.scheme.points, 1.0), chebyshev)
 
     @cached_property
     def _work(self):

@@ -353,6 +353,12 @@ def settle(e, t, along, u0, u1, v1, state, history):
 
 
 @source
+def kinetic_energy(M, v, scratch):
+    multiply(M, v, scratch)
+    return 0.5 * dot(v, scratch)
+
+
+@source
 def row_of(x, n):
     return x[n if x.shape[0] > 1 else 0]
 

@@ -288,17 +288,6 @@ class Run:
         # only the last step may be shorter, so that factors can be reused
         self._whole = self._count if even and self._last else self._count - 1
 
-    def _turn(self, y):
-        """Start the next segment after a breakpoint, with new accelerations and rates."""
-        self._segment, self._n = self._segment + 1, 0
-        self._limit()
-        if self._sizes is not None:
-            self._size = FIRST * self.task.span
-            self._sizes.averages = np.zeros_like(self._sizes.averages)
-        turned = self._begin_segment(y.u, y.v, y.history, False)
-        turned.dissipated, turned.start, turned.parts = y.dissipated, y.start, y.parts or [y]
-        return self._follow(y.turns, turned)
-
     def _time(self, n):
         """Time after n steps of the segment."""
         return self._begun + n * self._size if n < self._count else self._end
@@ -386,7 +375,15 @@ class Run:
                 new = self._interpolated(old, new, root)
                 self.event = new.t
         if self.event is None and new.t >= self._end and not self._last:
-            new = self._turn(new)
+            # the next segment has new accelerations and rates
+            self._segment, self._n, end = self._segment + 1, 0, new
+            self._limit()
+            if self._sizes is not None:
+                self._size = FIRST * self.task.span
+                self._sizes.averages = np.zeros_like(self._sizes.averages)
+            new = self._begin_segment(end.u, end.v, end.history, False)
+            new.dissipated, new.start, new.parts = end.dissipated, end.start, end.parts or [end]
+            self._follow(end.turns, new)
             if self._until is not None:  # a change of sign at a breakpoint is an event there
                 before, self._value = self._value, value(new)
                 if before * self._value < 0.0:

@@ -21,13 +21,11 @@ from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERG
                                      SINGULAR, correction_size, judged, motion_size,
                                      noise_of_step)
 from .records import (ITERATIONS, acceleration_of_joints, add_damping, damping_force, drive_rate,
-                      motion_at, row_of, settle)
+                      kinetic_energy, motion_at, row_of, settle)
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
 #: steps.
 REUSED, MIXED, LASTING = 0.3, 0.5, 32
-#: Newton corrections of the joints at the end of a step.
-CLOSINGS = 2
 
 
 @source
@@ -221,14 +219,13 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     """Iterate to the points of a step, which sets U, V and W; False on failure."""
     n, scratch, status, u0 = method.points.size, w.x[0], GO_ON, w.y[0]
     rates = w.gaps.size > 0 or matrices.dampers.active > 0
-    multiply(matrices.M, u0, scratch)
     largest = np.max(method.values[0]**2 + method.values[1]**2) / (s.h * s.h)
     reference = motion_size(state.energy[0])
-    noise = noise_of_step(rule, 1.0, largest, abs(np.dot(u0, scratch)))
+    noise = noise_of_step(rule, 1.0, largest, abs(2.0 * kinetic_energy(matrices.M, u0, scratch)))
     state.fresh[0], state.correction[0] = 0, -1.0
     if state.mixed_steps[0] > 0:
         state.factors[0] = 0  # the beam has rotated since
-    _start(e, matrices, method, s, w, state, step)
+    _start(e, method, s, w, state, step)
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w, step, rates)
         if state.factors[0] == 0:
@@ -252,7 +249,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if status == GO_ON and state.fresh[0] > 0 and e.lasting < MATERIALS and lost:
             state.mixed_steps[0], status = LASTING, RESTART  # with the same factors
         if status == RESTART:
-            _start(e, matrices, method, s, w, state, step)
+            _start(e, method, s, w, state, step)
         elif status != GO_ON:
             break
         elif state.mixed_steps[0] > 0:
@@ -319,8 +316,7 @@ def _end(e, matrices, method, s, w, state, step):
             return False
         if ends:
             add_multiple(1.0, w.l[n - 1], w.shares)
-    multiply(matrices.M, v, scratch)
-    state.energy[0] = max(state.energy[0], 0.5 * np.dot(v, scratch))
+    state.energy[0] = max(state.energy[0], kinetic_energy(matrices.M, v, scratch))
     return True
 
 
@@ -353,7 +349,7 @@ def _close(e, matrices, s, w, motion, t, step):
     u, v, g, x = w.y[0], w.y[1], motion.g[0], w.x[3]
     bends = e.joints.hk.size > 0 or e.joints.custom > 0  # J depends on u or t
     turns = step == 0 or s.g.shape[0] > 1
-    for k in range(CLOSINGS):
+    for k in range(2):  # Newton corrections
         joint_directions(e.joints, g, t, u, w.end[0])
         constraint(e.joints, motion.c[0], g, t, u, w.shares)
         clear(x)
@@ -373,7 +369,7 @@ def _meet(mass, free, w, x, anew):
 
 
 @source
-def _start(e, matrices, method, s, w, state, step):
+def _start(e, method, s, w, state, step):
     """Set the initial guess; in the mixed iteration from the mean acceleration of the last step."""
     # A polynomial through the vibrations of a stiff beam extrapolates badly.
     w.Z[:], w.l[:] = w.guess, w.first

@@ -33,7 +33,8 @@ from ..equations.convergence import (DEPENDENT, DONE, EXPECTED, FAILED, GO_ON, L
                                      SYMMETRIC, UNSETTLED, UNSYMMETRIC, correction_size,
                                      judged, motion_size, noise_of_step)
 from .records import (ALL, AUGMENTED, ITERATIONS, acceleration_of_joints, add_damping,
-                      damping_force, drive_rate, factorize_rows, settle, solve_rows, step_of)
+                      damping_force, drive_rate, factorize_rows, kinetic_energy, settle, solve_rows,
+                      step_of)
 
 
 #: Relative correction beyond which factors of the predicted end of a step are poor.
@@ -43,12 +44,6 @@ ROUGHLY, EXACTLY = range(2)
 
 
 # the residual of a step, ``Q - f - M a - J^T lambda``, at an iterate
-
-@source
-def kinetic_energy(M, v, scratch):
-    multiply(M, v, scratch)
-    return 0.5 * dot(v, scratch)
-
 
 @source
 def to_middle(rule, w):
@@ -83,10 +78,11 @@ def internal_force(e, matrices, rule, s, w, state):
     # In the mixed iteration with independent stresses S, the residual of ``S = D eps(u)`` acts in
     # the directions of the factors: ``f = B(u)^T S + B(origin)^T (D eps(u) - S)``, and likewise for
     # viscous stresses.
-    u0, u, f, S = w.y[0], w.x.u, w.x.force, w.stresses
+    conserving, u, f, S = rule.conserving > 0, w.x.u, w.x.force, w.stresses
+    u0 = w.y[0] if conserving else u
     missing, independent, constitutive, slow, rates = S[2], S[3], S[4], S[5], S[6]
     if state.mixed_steps[0] > 0:
-        body_mixed(e.body, rule.conserving > 0, u0, u, f, independent, constitutive)
+        body_mixed(e.body, conserving, u0, u, f, independent, constitutive)
         for i in indices(missing.size):
             missing[i] = constitutive[i] - independent[i]
         if matrices.dampers.viscous > 0:
@@ -95,14 +91,11 @@ def internal_force(e, matrices, rule, s, w, state):
             add_multiple(1.0, rates, missing)
             add_multiple(-1.0, slow, missing)
         add_force_of(e.body, w.x.origin, missing, f)
-    elif rule.conserving > 0:
+    elif conserving:
         body_mean(e.body, u0, u, f)
     else:
         body_force(e.body, u, f)
-    if rule.conserving > 0:
-        add_elastic_force(e.forces, s.t_force, s.dt, u0, u, state.guess[0], f)
-    else:
-        add_elastic_force(e.forces, s.t_force, 0.0, u, u, state.guess[0], f)
+    add_elastic_force(e.forces, s.t_force, s.dt if conserving else 0.0, u0, u, state.guess[0], f)
     if matrices.dampers.active > 0:  # materials are included already in the mixed iteration
         d = w.x.damping
         damping_force(e, matrices.dampers, matrices.M, s.t_force, w.x.middle, w.x.damping_velocity,
@@ -149,12 +142,7 @@ def add_impulses(e, matrices, rule, s, w, state):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
     v0, v, scratch, share, impulse = w.y[1], w.x.v, w.x.scratch, w.m.phi, w.m.impulse
     if e.joints.custom > 0:
-        n = v.size
-        ends = np.empty(3 * n + impulse.size)
-        copy(v0, ends[:n])
-        copy(v, ends[n:2 * n])
-        copy(w.y[0], ends[2 * n:3 * n])
-        copy(impulse, ends[3 * n:])
+        ends = np.concatenate((v0, v, w.y[0], impulse))
         call_custom(JOINTS, e.joints.custom, np.int64(6), s.t_force, 1.0, w.x.u, ends, w.x.residual)
         return
     for i in indices(v.size):

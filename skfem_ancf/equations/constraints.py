@@ -21,8 +21,6 @@ from .rank import DENSE, DEPENDENT, FREE, groups
 
 #: Largest number of multipliers with dense Jacobians.
 FEW = 96
-#: Largest relative residual of redundant equations.
-OPENED = 1e-5
 #: Cached properties that change when redundant equations are removed.
 CACHED = "slopes", "seconds", "tabled", "_still", "_at_rest", "frame", "_limited"
 #: Empty rows, columns and values.
@@ -337,7 +335,8 @@ class Constraints:
     def lost(self, u: Array) -> str:
         """Why a joint cannot act in a converged state, or ""."""
         for joint, out, size in self._unasked:
-            if (np.abs(joint.value(u, 0.0)[out]) > OPENED * size).any():
+            # redundant equations are opened
+            if (np.abs(joint.value(u, 0.0)[out]) > 1e-5 * size).any():
                 return f"{joint!r} contradicts the other joints in this position"
         return next(filter(None, (joint.lost(u) for joint in self._limited)), "")
 

@@ -24,8 +24,6 @@ logger = logging.getLogger(__name__)
 
 #: Smallest relative pivot of a definite matrix.
 SURE = 1e-10
-#: Largest number of DOFs for the inertia of a dense matrix.
-SMALL_ENOUGH = 100
 #: Largest relative residual of factors without pivoting.
 ROUGH = 1e-8
 
@@ -341,7 +339,7 @@ class NullSpace:
 
     def reduced(self) -> Any:
         """K on the null space of J, dense if small."""
-        return self._reduced.toarray() if self._shape[1] <= SMALL_ENOUGH else self._reduced
+        return self._reduced.toarray() if self._shape[1] <= 100 else self._reduced
 
     def inertia(self) -> Inertia:
         """Inertia of the symmetric part of K on the null space of J."""

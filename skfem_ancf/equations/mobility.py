@@ -13,8 +13,6 @@ from .rank import DENSE, DEPENDENT, groups, null_space, row_sizes, unit_rows
 
 # redundant equations of joints
 
-#: Relative size of a remainder, compared with the largest, from which a row may be the next pivot.
-MUCH = 0.5
 #: Relative size of the trial motion.
 MOVED = 3e-3
 #: Largest relative residual of closed equations.
@@ -105,7 +103,7 @@ def _basis(A):
         left[kept] = 0.0
         if not left.max() > DEPENDENT:
             break
-        k = int((left >= MUCH * left.max()).argmax())
+        k = int((left >= 0.5 * left.max()).argmax())  # the first that is large enough
         q = A[k] / left[k]
         kept.append(k)
         for _ in range(2):  # reorthogonalise

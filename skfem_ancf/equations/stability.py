@@ -15,8 +15,6 @@ from .rank import is_symmetric
 
 logger = logging.getLogger(__name__)
 
-#: Smallest stiffness of unconstrained motions, relative to that of the loads.
-STABILISING = 1e-5
 #: Largest number of position DOFs for dense eigenvalues.
 DENSE = 64
 #: Largest relative difference of nodal displacements in a rigid translation.
@@ -174,7 +172,8 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
     weights = position_weights(system) * system.constraints.mask
     acting = np.max(loads * weights)
     nodes = min(np.sum(weights[s]) for s in system.slices)  # of the smallest part that may be loose
-    least = STABILISING * acting / (system.size * max(1.0, nodes))
+    # of rigid motions, relative to the stiffness of the loads
+    least = 1e-5 * acting / (system.size * max(1.0, nodes))
     system.K.add_diagonal(-least * weights)
     try:
         system.solver.factorize(u, 1.0, multipliers)

@@ -12,6 +12,7 @@ from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, 
 from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
 from . import strategies
+from .continuation import Point, Tracer
 from .iteration import (CONVERGED, DIVERGES, INDEFINITE, ITERATIONS, NOT_CONVERGED, SINGULAR,
                         Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                         StaticResult, TooManyIterations, Unstable, equilibrium)
@@ -117,10 +118,24 @@ class Increment:
             return found
         if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
             raise Unstable("the equilibrium found is unstable", found)
-        if (start.rejected and route.proportional and start.load > 0.0
-                and not strategies.heads_on(system, start, found.u)):
+        if start.rejected and not self._heads_on(found.u):
             raise Unstable("the equilibrium found lies on the side away from the load", found)
         return found
+
+    def _heads_on(self, u):
+        """True if u lies on the side of the last equilibrium to which the load increment points."""
+        # Close to a bifurcation an iteration may jump to the other side. The displacement is
+        # compared with the tangent of the path of proportional loads.
+        system, start = self.system, self.start
+        if (not self.options.route.proportional or start.load == 0.0
+                or system.forces.contacts.moving):  # the tangent has no motion of obstacles
+            return True
+        try:
+            ahead = Tracer(system).set_tangent(Point(
+                system, start.u, start.multipliers, start.load, start.u)).tangent
+        except LoadStepFailed:
+            return True
+        return bool(ahead @ (stability.position_weights(system) * (u - start.u)) >= 0.0)
 
     def resting(self) -> Equilibrium | None:
         """The last equilibrium, if only round-off acts there; else None."""
@@ -298,8 +313,7 @@ class Increment:
             except (LoadStepFailed, *NO_FACTORS) as error:
                 logger.info("no descent at load %.6g: %s", self.level, error)
                 continue
-            heads_on = (not route.proportional or start.load == 0.0
-                        or strategies.heads_on(system, start, other.u))
+            heads_on = self._heads_on(other.u)
             if heads_on or found is None:
                 found, saw_unstable = other, descent.saw_unstable
             if heads_on:

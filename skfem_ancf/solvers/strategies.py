@@ -32,7 +32,6 @@ from ..equations.evaluation import motion_is_clear
 from ..equations.stability import (inverse_on_positions, largest_displacement, position_weights,
                                    response, verdict)
 from ..equations.system import System
-from .continuation import Point, Tracer
 from .iteration import Equilibrium, LoadStepFailed, TooManyIterations, StaticResult
 
 logger = logging.getLogger(__name__)
@@ -44,12 +43,6 @@ KICK = 0.02
 #: Size of small corrections, number of consecutive small ones that indicates a stall at an unstable
 #: point, and number of inverse iterations for the softest direction.
 SMALL, STALLED, POWERS = 1e-3, 4, 4
-#: Number of unstable points that a descent may leave.
-KICKS = 6
-#: Ratio of compliances that indicates a limit point.
-SOFTER = 8.0
-#: Number of step cuts at unstable points before the path counts as unstable.
-CUTS = 3
 #: Iterations of a descent, and over those of Newton's method at its end.
 DESCENT, SHORTER = 200, 7
 #: Largest radius, and displacement that counts as diverged, relative to the scene's size.
@@ -59,20 +52,6 @@ WIDEST, LOST = 0.5, 20.0
 BACK, ONWARD, AWAY = 50, 0.5, 0.01
 #: How often a correction through an obstacle is halved.
 HALVED = 8
-
-
-def heads_on(system: System, start: StaticResult, u: Array) -> bool:
-    """True if ``u`` lies on the side of the last equilibrium to which the load increment points."""
-    # Close to a bifurcation an iteration may jump to the other side. The displacement is compared
-    # with the tangent of the path; moving obstacles are not tested.
-    if system.forces.contacts.moving:
-        return True  # the tangent has no motion of obstacles
-    point = Point(system, start.u, start.multipliers, start.load, start.u)
-    try:
-        ahead = Tracer(system).set_tangent(point).tangent
-    except LoadStepFailed:
-        return True
-    return bool(ahead @ (position_weights(system) * (u - start.u)) >= 0.0)
 
 
 def near_limit(system: System, start: StaticResult) -> bool:
@@ -88,7 +67,7 @@ def near_limit(system: System, start: StaticResult) -> bool:
             ratio.append(max(0.0, descent.extreme("LA")[0]))
     except NO_FACTORS:
         return True
-    return ratio[0] > SOFTER * ratio[1]
+    return ratio[0] > 8.0 * ratio[1]
 
 
 class Descent:
@@ -223,7 +202,7 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
     # potential.
     system, start, load = increment.system, increment.start, increment.load
     u, multipliers = start.u, start.multipliers
-    for _ in range(KICKS):
+    for _ in range(6):  # unstable points that it may leave
         try:
             found = increment.iterate((u, multipliers), options, descent)
         except TooManyIterations as failure:
@@ -260,8 +239,6 @@ CLOSE = 1e-2
 NEAR, FAR = 0.5, 1e3
 #: Least fraction of the surface that is near an obstacle if points are bound.
 PART = 0.03
-#: Mean penetration after the release, relative to the height.
-RELEASED = 0.1
 #: Penetrations relative to the height, and relative stored energy, above which an obstacle is too
 #: soft: deeper than the first, or deeper than the second with more energy.
 DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
@@ -345,14 +322,15 @@ class ContactSearch:
             found = self.solve(None, True)
         finally:
             memory[:] = before
-        # the mean pressure keeps all points in contact on obstacles as stiff as this
+        # all points stay in contact on obstacles so soft that the mean penetration is a tenth of
+        # the height
         wanted = contacts.stiffening.copy()
         for k, ((_, group), _, gap) in enumerate(contacts.look(found.u, self.t)):
             deep = np.maximum(-gap, 0.0)
             if np.any(deep):
                 mean = group.areas @ deep / group.areas[deep > 0.0].sum()
                 most = max(1.0, group.largest_factor / LARGEST_FACTOR)
-                wanted[k] = min(most, (1.0 + wanted[k]) * mean / (RELEASED * group.height)) - 1.0
+                wanted[k] = min(most, (1.0 + wanted[k]) * mean / (0.1 * group.height)) - 1.0
         contacts.stiffen(wanted, *self.start)
         if contacts.anchored:
             with contacts.without_friction():
