@@ -142,7 +142,7 @@ class Integrator:
         y = Motion(t, np.where(free, u, u_fixed), np.where(free, v, v_fixed), a_fixed.copy(),
                    np.zeros(s.N), np.zeros(m), np.zeros(m))
         self._require_fitting_supports(y.u - u, t)
-        tables, J, rate, at = s.backend.tables, None, np.zeros(m), min(t, self.limit)
+        tables, J, rate, at = s.backend.tables, None, y.multipliers, min(t, self.limit)
         # the tables of custom joints have no rates of functions of time
         custom = tables.plain.joints.custom > 0 and tables.motion_varies
         if m:
@@ -227,8 +227,8 @@ class Integrator:
         rows, multipliers = np.empty((n, 4, s.N)), np.empty((n, 2, self.m))
         memories = np.full((n, 2 + (s.histories.values.size if lasting else 0)), np.nan)
         kernel, goes_on, ahead, points = self._begin(y, dt, n)
-        data = Interval._make([float(dt), goes_on, ahead, *(  # steps and instants in one axis
-            np.ascontiguousarray(x).reshape(len(x) * x.shape[1], *x.shape[2:]) for x in given),
+        data = Interval._make([float(dt), goes_on, ahead, *[  # steps and instants in one axis
+            x.reshape(x.shape[0] * x.shape[1], *x.shape[2:]) for x in given],
             int(s.backend.tables.motion_varies)])
         done = self._call(kernel, y, dt, (rows, memories[:, :2]), self._rule, data, self._state,
                           self._work, memories, rows, multipliers, points)

@@ -133,11 +133,15 @@ class Constraints:
 
     def values(self, load: float, t: float | None = None) -> Array:
         """Displacements of the fixed DOFs (nfixed,) at a load factor and a time."""
-        return self.values_at(np.array([load if t is None else t]), load)[0]
+        values = load * self.given + self._held
+        for joint, first, factors in self._moving:
+            phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
+            values[first:first + len(factors)] = -phi / factors
+        return values
 
-    def values_at(self, times: Array, load: float = 1.0) -> Array:
-        """Displacements of the fixed DOFs at times (n,), by default at full load: (n, nfixed)."""
-        values = np.tile(load * self.given + self._held, (len(times), 1))
+    def values_at(self, times: Array) -> Array:
+        """Displacements of the fixed DOFs at full load, at times (n,): (n, nfixed)."""
+        values = np.tile(self.given + self._held, (len(times), 1))
         for joint, first, factors in self._moving:
             values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
         return values
