@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 from ..beam.kernels.tables import points_of
 from ..core import announced_bar, cached_property, code_cache, deferred, raise_kept
-from ..core.code_cache import compiled_off, compiled_setting
 from .tables import Tables
 
 logger = logging.getLogger(__name__)
@@ -105,12 +104,12 @@ class Backend:
     def choose(self, name: str, iterations: float = 1.0) -> Choice:
         """The choice for the next call of a kernel, by its name and expected iterations."""
         missing = self._missing(name)
-        if not (missing or self._plain or PROBLEMS) and compiled_setting() != "0":
+        if not (missing or self._plain or PROBLEMS) and code_cache.compiled_setting() != "0":
             return Choice("loaded", "compiled code is loaded")
-        off = self._plain or (PROBLEMS[0] if PROBLEMS else compiled_off())
+        off = self._plain or (PROBLEMS[0] if PROBLEMS else code_cache.compiled_off())
         if off is not None:
             return Choice("plain", off)
-        if compiled_setting() == "1":
+        if code_cache.compiled_setting() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
         if missing == [name] and SECONDS[name] <= SHORT:
             return Choice("compiled", "its parts are loaded")

@@ -5,7 +5,6 @@ those of the node plus the residual of the joint equations. Multipliers are ther
 they are the residual forces at the ends. Statics, modes and time integration use the same
 factors."""
 
-import logging
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -18,8 +17,6 @@ from ..beam import Beam
 from ..core.band import SMALL, BandMatrix, Inertia
 from ..core import Array
 from .rank import diagonal_factors
-
-logger = logging.getLogger(__name__)
 
 #: A pivot that small beside the diagonal is round-off.
 LOST = 1e-13
@@ -395,7 +392,7 @@ class _Part:
                 if np.min(pivots) > SMALL:
                     continue
             except np.linalg.LinAlgError:
-                logger.debug("members buckle between their ends")
+                pass  # members buckle between their ends
             values = np.linalg.eigvalsh(A)
             negative += int(np.sum(values < 0.0))
             singular = singular or bool(np.any(np.abs(values) < LOST))

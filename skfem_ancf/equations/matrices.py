@@ -9,7 +9,6 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
 from ..actions.forces.kernels import add_elastic_force
@@ -187,7 +186,7 @@ class StrainTangent:
 
     def _set_stress(self, stress, multipliers):
         self.stress, self.multipliers = stress, multipliers
-        K = csr_matrix(self.system.element_stiffness(self._at[0], self._at[3]))
+        K = sparse.csr_matrix(self.system.element_stiffness(self._at[0], self._at[3]))
         self.S = self.geometric(stress, multipliers, self._at[1]) + K[self.free][:, self.free]
 
     def _element_force(self):
@@ -196,7 +195,7 @@ class StrainTangent:
         add_elastic_force(system.backend.tables.plain.forces, self._at[3], 0.0, u, u, 0, force)
         return force[self.free]
 
-    def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:
+    def geometric(self, stress: Array, multipliers: Array, load: float) -> sparse.csr_matrix:
         """The part S (n, n) for stresses (k,), multipliers (m,) and a load factor."""
         u, _, t, time = self._at
         S = []
@@ -227,7 +226,7 @@ class StrainTangent:
         du[self.free] = x[:, 0]
         return du, self.stresses(du), multipliers[:, 0]
 
-    def balance(self, M: csr_matrix, shift: float) -> None:
+    def balance(self, M: sparse.csr_matrix, shift: float) -> None:
         """Replace the stress by one in equilibrium, if the state is an equilibrium to round-off."""
         # The axial stress of a slender beam has the round-off of the strain times E. The correction
         # of the displacement is negligible, that of the stress is not. ``K + shift M`` must be
@@ -259,7 +258,7 @@ class StrainTangent:
         """True if the tangent is symmetric to round-off."""
         return is_symmetric(self.S, self.system.constraints.coordinate_sizes[self.free])
 
-    def multiply(self, x: Array, S: csr_matrix | None = None) -> Array:
+    def multiply(self, x: Array, S: sparse.csr_matrix | None = None) -> Array:
         """The tangent times x, (n,) or (n, k); with another S if given."""
         return self.B.T @ (self.CB @ x) + (self.S if S is None else S) @ x
 
@@ -291,7 +290,7 @@ def _joined(parts):
 
 
 def load_stiffness(system: Any, u: Array, load: float, t: float | None = None,
-                   first_order: bool = False) -> csr_matrix:
+                   first_order: bool = False) -> sparse.csr_matrix:
     """Minus the derivative (N, N) of the loads at u (N,), or of those of first order alone."""
     K = sparse.csr_matrix((system.N, system.N))
     for item in system.loads:

@@ -1,6 +1,5 @@
 """Rank, null spaces and inertia of sparse matrices."""
 
-import logging
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -12,8 +11,6 @@ from scipy.sparse.linalg import splu
 
 from ..core.band import SMALL, Inertia, beside_zero, dense
 from ..core import Array
-
-logger = logging.getLogger(__name__)
 
 #: Relative remainder of a dependent row.
 DEPENDENT = 1e-9
@@ -106,7 +103,7 @@ def inertia_of(A: Array | sparse.csr_array) -> Inertia:
         if positive and np.all(_pivots(A) > SMALL):
             return Inertia(0, False)
     except np.linalg.LinAlgError:
-        logger.debug("not definite")
+        pass  # not definite
     return beside_zero(lambda shift: int(np.sum(_pivots(A + shift * one) < 0.0)))
 
 

@@ -1,6 +1,5 @@
 """Stability of an equilibrium."""
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -12,8 +11,6 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 from ..core.band import Inertia, fix
 from ..core import NO_FACTORS, Array
 from .rank import is_symmetric
-
-logger = logging.getLogger(__name__)
 
 #: Largest number of position DOFs for dense eigenvalues.
 DENSE = 64
@@ -156,7 +153,7 @@ def not_unstable(system: Any, u: Array, load: float, multipliers: Array, t: floa
         if system.solver.stays():
             return True
     except NO_FACTORS:
-        logger.debug("the last factors do not decide")
+        pass  # the last factors do not decide
     return verdict(system, u, load, multipliers, t).stability != "unstable"
 
 

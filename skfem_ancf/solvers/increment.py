@@ -297,7 +297,7 @@ class Increment:
         if not unstable and not strategies.near_limit(system, start):
             return None
         if not stability.has_potential(system, start.u, self.load):
-            if not isinstance(failure, Unstable):
+            if not unstable:
                 return None
             start.unstable = True
             start.doubt = (f"the path is unstable from the load level {self.level:.6g} on, and the "

@@ -209,7 +209,7 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
             # at its end Newton's method is better, where a mode is very soft
             if descent.shift > 0.0 or system.forces.contacts.obstacles or system.forces.changing:
                 raise  # far from the end, or where it may leave what is touched
-            found = increment.iterate(failure.reached, options._replace(
+            found = increment.iterate(failure.found, options._replace(
                 method="newton", most=options.most // SHORTER))
         u, multipliers = found.u, found.multipliers
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
