@@ -387,10 +387,9 @@ class MassSolver:
     def _condensed(self):
         return CondensedMass(self._system)
 
-    def __call__(self, u: Array, t: float, J: Any = None
-                 ) -> Callable[[Array, Array], tuple[Array, Array]]:
+    def __call__(self, u: Array, t: float, J: Any) -> Callable[[Array, Array], tuple[Array, Array]]:
         """A function of b (N,) and rate (m,) that returns x and l, at one displacement and time."""
-        # J is ``constraints.full_jacobian(u, t)`` if known.
+        # J is ``constraints.full_jacobian(u, t)`` if there are joints.
         if self.by_nodes:
             mass = self._condensed
             mass.forget()
@@ -400,11 +399,10 @@ class MassSolver:
                 return mass.solve(u, t, b, rate)
 
             return solve_by_nodes
-        M, constraints = self.factors, self._system.constraints
-        free = constraints.free
-        if not constraints.m:
+        M, free = self.factors, self._system.constraints.free
+        if not self._system.constraints.m:
             return lambda b, rate: (M.solve(b * free), np.zeros(0))
-        J = dense(constraints.full_jacobian(u, t) if J is None else J) * free
+        J = dense(J) * free
         Y = M.solve(J.T)
         S = J @ Y
 
