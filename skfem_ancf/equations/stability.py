@@ -146,17 +146,6 @@ def has_potential(system: Any, u: Array, load: float) -> bool:
     return _is_symmetric(system)
 
 
-def not_unstable(system: Any, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
-    """True unless the equilibrium that an iteration just found is unstable."""
-    # The last factors usually decide; otherwise the tangent is factorised at the solution.
-    try:
-        if system.solver.stays():
-            return True
-    except NO_FACTORS:
-        pass  # the last factors do not decide
-    return verdict(system, u, load, multipliers, t).stability != "unstable"
-
-
 def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
     """True if loads or obstacles stabilise a scene with unconstrained rigid motions."""
     # The tangent at u (N,) must be positive definite beyond round-off.

@@ -116,7 +116,12 @@ class Increment:
             raise LoadStepFailed(passed)
         if not stable or start.unstable:
             return found
-        if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
+        try:  # the last factors usually decide; else those of the tangent at the solution
+            stays = system.solver.stays()
+        except NO_FACTORS:
+            stays = False
+        if not stays and stability.verdict(system, found.u, self.load, found.multipliers,
+                                           self.time).stability == "unstable":
             raise Unstable("the equilibrium found is unstable", found)
         if start.rejected and not self._heads_on(found.u):
             raise Unstable("the equilibrium found lies on the side away from the load", found)
