@@ -97,15 +97,12 @@ def columns_of(motions: Sequence[Motion]) -> dict[str, Array]:
 def interpolate(a: Motion, b: Motion, t: float) -> Motion:
     """Interpolate between two instants: cubic Hermite in u, linear in the accelerations."""
     h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
-    du = b.u - a.u
+    du, names = b.u - a.u, ("acceleration", "multipliers", "dissipated")
     u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)
     v = (6 * s * (1 - s) / h * du + (1 - s) * (1 - 3 * s) * a.v + s * (3 * s - 2) * b.v)
 
-    def linear(name):
-        return (1 - s) * getattr(a, name) + s * getattr(b, name)
-
-    return replace(a, t=t, u=u, v=v, **{name: linear(name) for name in (
-        "acceleration", "multipliers", "dissipated")})
+    return replace(a, t=t, u=u, v=v, **{
+        name: (1 - s) * getattr(a, name) + s * getattr(b, name) for name in names})
 
 
 class Scheme:
@@ -227,13 +224,8 @@ def in_steps(scheme: Scheme) -> bool:
 GROWTH = 2.0
 
 
-def difference(x: Array, a: Array) -> Array:
-    """The derivative of order n - 1 of the polynomial through n points, shape (N,)."""
-    return difference_row(x) @ a
-
-
 def difference_row(x: Array) -> Array:
-    """Weights (n,) of :func:`difference`."""
+    """Weights (n,) of values at n points in the derivative of order n - 1 of their polynomial."""
     if len(x) < 3:
         return np.ones(1) if len(x) == 1 else np.array([1.0, -1.0]) / (x[0] - x[1])
     gaps = x[:, None] - x
@@ -251,7 +243,8 @@ def derivative(old: Motion, new: Motion, t: float, value: Array,
     times = np.append(t, before.get("times", ()))[:order + 1]
     new.memory = {**(new.memory or {}), "values": values[:order], "times": times[:order]}
     k = len(times) - 1
-    return k, difference(times, values), difference(times[:k], values[:k]) if k else None
+    return k, difference_row(times) @ values, (
+        difference_row(times[:k]) @ values[:k] if k else None)
 
 
 def grown(size: Array, lower: Array, missing: int) -> Array:

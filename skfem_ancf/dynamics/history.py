@@ -37,8 +37,6 @@ def angular_momentum(system: System, u: Array, v: Array) -> float:
 
 #: Number of states whose fields are recovered together.
 TOGETHER = 32
-#: Default number of instants in a plot.
-STROBES = 8
 
 
 def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> State:
@@ -322,7 +320,7 @@ class History(MaterialPoints):
         """
         refuse(not len(self), "the history has no instants")
         first, last = self.t[0], self.t[-1]
-        wanted = np.linspace(first, last, STROBES) if times is None else np.ravel(
+        wanted = np.linspace(first, last, 8) if times is None else np.ravel(
             require_finite("times", times))
         refuse(not len(wanted) or wanted.min() < first or wanted.max() > last, "times must be "
                "instants of the motion, from {:g} to {:g}; got {!r}", first, last, times)

@@ -21,10 +21,6 @@ from .run import Run, TimeStepFailed, task_of
 from .schemes import SCHEMES, get_scheme
 from .sensors import Sensor
 
-#: Interval in steps between checks for inverted elements.
-LOOKED = 16
-#: Part of the energy that collocation may bring in where materials yield.
-GAIN = 0.02
 #: Memory limit of the dense constraint Jacobians, in gigabytes.
 LARGEST = 2.0
 #: Kind of the files.
@@ -88,35 +84,31 @@ def integrate(system: System, scheme: Scheme, start: State | None, u: Array | No
 def follow(run: Run, file: "Checkpoint | None" = None, progress: bool | None = None) -> History:
     """Take all steps of a Run; warn about inverted elements and deep contact."""
     history, inverted = _go(run, file, progress)
-    contacts = run.system.forces.contacts
+    system, contacts = run.system, run.system.forces.contacts
     texts = [] if inverted is None else [
         f"elements are turned inside out at t = {inverted:.6g} or before: the compression or "
         "bending is too large, and results after that time are meaningless. Use NeoHookean, more "
         "elements, a smaller load or shorter steps"]
-    texts += filter(None, [contacts.sweep.deep(), _gained(run, history)])
-    texts += run.system.after(run.y.history).forces.contacts.sunk(run.y.u, run.y.t)
+    texts += filter(None, [contacts.sweep.deep()])
+    # points of a step of collocation that does not resolve stress waves yield to and fro; the work
+    # from outside has to be known
+    if run.scheme.collocates and system.histories.path_dependent and len(history) > 1 and not (
+            system.varies or system.backend.tables.motion_varies or system.forces.elements or any(
+                load.potential(0.0 * history.u[0][system.of(load)]) is None
+                for load in system.loads)):
+        columns = {name: rows[[0, -1]] for name, rows in history._columns.items()}
+        ends = History(system, run.scheme, columns, (None, None), history.sensors)
+        gain = float(np.diff(ends.total_energy + ends.dissipated)[0])
+        size = float(np.max(ends.kinetic_energy + ends.strain_energy))
+        if gain > 0.02 * size:
+            texts.append(
+                f"{run.scheme!r} brought in {gain / size:.0%} of the energy: materials yielded in "
+                "steps that do not resolve the waves of stress, and the motion is wrong. Use "
+                "scheme='energy-momentum', which keeps the balance, or a smaller dt")
+    texts += system.after(run.y.history).forces.contacts.sunk(run.y.u, run.y.t)
     for text in texts:
         warn(text, ModelWarning)
     return history
-
-
-def _gained(run, history):
-    """A warning if yielding within steps of collocation has brought energy in, or None."""
-    # Points of a step that does not resolve stress waves yield to and fro.
-    system = run.system
-    if not (run.scheme.collocates and system.histories.path_dependent and len(history) > 1):
-        return None
-    if system.varies or system.backend.tables.motion_varies or system.forces.elements or any(
-            load.potential(0.0 * history.u[0][system.of(load)]) is None for load in system.loads):
-        return None  # the work from outside is not known
-    columns = {name: rows[[0, -1]] for name, rows in history._columns.items()}
-    ends = History(system, run.scheme, columns, (None, None), history.sensors)
-    gain = float(np.diff(ends.total_energy + ends.dissipated)[0])
-    size = float(np.max(ends.kinetic_energy + ends.strain_energy))
-    return None if gain <= GAIN * size else (
-        f"{run.scheme!r} brought in {gain / size:.0%} of the energy: materials yielded in steps "
-        "that do not resolve the waves of stress, and the motion is wrong. Use "
-        "scheme='energy-momentum', which keeps the balance, or a smaller dt")
 
 
 def _go(run, file, progress):
@@ -131,7 +123,7 @@ def _go(run, file, progress):
                 run.advance()
                 bar.update(run.y.t - before)
                 if inverted is None and (run.steps >= looked or run.done):
-                    looked, u = run.steps + LOOKED, run.y.u
+                    looked, u = run.steps + 16, run.y.u  # now and then
                     if system.inverted(u) or system.folded(u):
                         inverted = run.y.t
                 if file is not None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.obstacles.contact import may_touch
-from ..actions.tables import constraint, joint_directions
 from ..core.band import SPARE, Band, BandMatrix, Coupling, coupling, factorize, fix, solve
 from ..core import (I1, Array, ConvergenceError, SupportError, handle_of, hints, refuse,
                     require_positive)
@@ -21,65 +20,16 @@ from .base import COLUMNS, Motion, Motions, Scheme, in_steps, interpolate
 from .schemes import EnergyMomentum
 from .collocation import Collocation
 from .time_functions import SAMPLES, TimeFunctions, rates
-from .records import (FAILURES, Dampers, Interval, JointMotion, JointMotions, LowRankRows,
-                      Matrices, Multipliers, Rule, StageWork, StepData, StepState, Vectors, Work,
+from .records import (FAILURES, Dampers, Interval, JointMotion, LowRankRows,
+                      Matrices, Multipliers, Rule, StageWork, StepState, Vectors, Work,
                       acceleration_of_joints, drive_rate, mass_factor, solve_rows)
 from .stages import collocate, solve_for
 from .steps import factors, steps
 
 
-# joint constraints at one instant: gap, Jacobian and rates
-
-class JointRates:
-    """The joints at a displacement and a time."""
-
-    def __init__(self, system: System, motion: JointMotion, u: Array,
-                 instant: tuple[float, float, bool, float]) -> None:
-        self._system, self._u, self._instant = system, u, instant
-        self._tables = system.backend.tables.plain.joints
-        if self._tables.custom and motion.drives:
-            c = rates(lambda times: np.array([system.constraints.constraint(u, t)
-                                              for t in times]), *instant)
-            motion = JointMotion(np.vstack([motion.c[:1], c]), motion.g, 0)
-        self._motion = motion
-
-    def gap(self) -> Array:
-        """Phi, shape (m,)."""
-        out, motion = np.empty(self._system.constraints.m), self._motion
-        constraint(self._tables, motion.c[0], motion.g[0], self._instant[0], self._u, out)
-        return out
-
-    @cached_property
-    def J(self) -> Any:
-        """The Jacobian of Phi, shape (m, N), dense or sparse."""
-        s = self._system
-        if not s.constraints.few:
-            return s.constraints.sparse_jacobian(self._u, self._instant[0])
-        J = np.empty((s.constraints.m, s.N))
-        joint_directions(self._tables, self._motion.g[0], self._instant[0], self._u, J)
-        return J
-
-    def rate(self, v: Array) -> Array:
-        """The first rate of Phi, shape (m,)."""
-        out, (t, dt, *_) = np.empty(self._system.constraints.m), self._instant
-        drive_rate(self._tables, self._motion, t, dt, self._u, out)
-        return out + self.J @ v
-
-    def bend(self, v: Array, a: Array) -> Array:
-        """The second rate of Phi, shape (m,)."""
-        s, out, (t, dt, *_) = self._system, np.empty(self._system.constraints.m), self._instant
-        acceleration_of_joints(self._tables, self._motion, t, dt, self._u, v, out)
-        if self._tables.custom and s.constraints.drives:
-            out += 2.0 * rates(lambda times: np.array([
-                s.constraints.full_jacobian(self._u, t) @ v for t in times]), *self._instant)[0]
-        return out + self.J @ a
-
-
 logger = logging.getLogger(__name__)
 
 DEPTH = 6  # how often a step is halved
-#: Factors of the step size that are tried to step past a singular position of the joints.
-LEAPS = 1.5, 2.3, 3.7, 6.1, 11.0, 23.0
 #: Approximate iterations of a step, by which work in NumPy is counted.
 OF_STEP = 3
 #: Names in checkpoints of the entries beside the band.
@@ -109,6 +59,9 @@ class Integrator:
             alpha_m, alpha_f, beta, _ = scheme.parameters
             kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)
             system.forces.contacts.require_penalty(scheme, kick if in_steps(scheme) else np.inf)
+        # collocation evaluates all points of a step at once
+        self._backend = system.backend.copied(len(scheme.points)) if isinstance(
+            scheme, Collocation) else system.backend
         M, A = system.mass, system.new_band()
         self._nodes: tuple[Condensed, CondensedMass] | None = None
         if in_steps(scheme) and system.mass_solver.by_nodes:
@@ -119,7 +72,14 @@ class Integrator:
         self._couplings = [Coupling(X, partial(_couplings, system)) for X in (A, U)
                            if system.forces.changing]
         A, U = [one.band for one in self._couplings] or (A, U)
-        self._matrices = Matrices(M, system.mass_solver.factors, A, U, *_damping(system))
+        modes, k = system.modal_damping.rows, len(system.forces.border_rows)
+        k += len(modes)
+        beside = LowRankRows(np.concatenate([modes, system.forces.border_rows]), np.zeros((k, k)),
+                             np.zeros((k, system.N)), np.zeros((k, k)))
+        D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))
+        dampers = Dampers(int(system.damped), int(system.viscous), int(system.forces.resists),
+                          system.damping.mass, D, modes)
+        self._matrices = Matrices(M, system.mass_solver.factors, A, U, beside, dampers)
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self._rule = Rule._make([
             int(scheme.conserving), *map(float, scheme.parameters), self.tol,
@@ -130,7 +90,6 @@ class Integrator:
         # means over steps differ from values at their ends where a step does not resolve an impact
         self._means = scheme.conserving and may_touch(system)
         self.longest = max(1, min(STORED // (4 * system.N + system.histories.values.size), BLOCK))
-
 
     @property
     def iterations(self) -> int:
@@ -183,22 +142,31 @@ class Integrator:
         y = Motion(t, np.where(free, u, u_fixed), np.where(free, v, v_fixed), a_fixed.copy(),
                    np.zeros(s.N), np.zeros(m), np.zeros(m))
         self._require_fitting_supports(y.u - u, t)
-        joined, rate = None, y.multipliers
+        tables, J, rate, at = s.backend.tables, None, y.multipliers, min(t, self.limit)
+        # the tables of custom joints have no rates of functions of time
+        custom = tables.plain.joints.custom > 0 and tables.motion_varies
         if m:
-            joints = JointMotion(given.c[0, 0], np.vstack([given.g[0, 0, :1], given.g[0, 0]]),
-                                 int(s.backend.tables.motion_varies))
-            joined = JointRates(s, joints, y.u, (t, dt, ahead, self.limit))
-            gap = np.abs(joined.gap())
-            if np.any(gap > 1e-8 * s.backend.tables.plain.joints.sizes):
-                raise SupportError("the joints are not closed at the start: the largest gap is "
-                                   f"{gap.max():.3g}. Change the positions of the beams, or start "
-                                   "from a static solution (start=)")
-        solve = s.mass_solver(y.u, t, None if joined is None else joined.J)
+            c, g = given.c[0, 0].copy(), given.g[0, 0]
+            gap, J = np.abs(s.constraints.constraint(y.u, at)), s.constraints.full_jacobian(y.u, at)
+            refuse(np.any(gap > 1e-8 * tables.plain.joints.sizes), "the joints are not closed at "
+                   "the start: the largest gap is {:.3g}. Change the positions of the beams, or "
+                   "start from a static solution (start=)", gap.max(), error=SupportError)
+            if custom:
+                c[1:] = rates(lambda times: np.array([
+                    s.constraints.constraint(y.u, x) for x in times]), t, dt, ahead, self.limit)
+            joints = JointMotion(c, g, int(tables.motion_varies and not custom))
+            drive_rate(tables.plain.joints, joints, t, dt, y.u, rate)
+            rate = -(rate + J @ y.v)
+        solve = s.mass_solver(y.u, t, J)
         jump = y.v - v  # impulses of the supports change the velocity of the free DOFs
-        if joined is not None or jump.any():
-            y.v = y.v + solve(-M.multiply(jump), rate if joined is None else -joined.rate(y.v))[0]
-        if joined is not None:
-            rate = -joined.bend(y.v, y.acceleration)
+        if m or jump.any():
+            y.v = y.v + solve(-M.multiply(jump), rate)[0]
+        if m:
+            acceleration_of_joints(tables.plain.joints, joints, t, dt, y.u, y.v, rate)
+            if custom:
+                rate += 2.0 * rates(lambda times: np.array([s.constraints.full_jacobian(
+                    y.u, x) @ y.v for x in times]), t, dt, ahead, self.limit)[0]
+            rate = -(rate + J @ y.acceleration)
         force, y.history = self._forces(y, history)
         acceleration, y.multipliers = solve(force - M.multiply(y.acceleration), rate)
         y.acceleration += acceleration
@@ -258,7 +226,10 @@ class Integrator:
         lasting = s.histories.lasting
         rows, multipliers = np.empty((n, 4, s.N)), np.empty((n, 2, self.m))
         memories = np.full((n, 2 + (s.histories.values.size if lasting else 0)), np.nan)
-        kernel, data, points = self._begin(y, dt, n, given)
+        kernel, goes_on, ahead, points = self._begin(y, dt, n)
+        data = Interval._make([float(dt), goes_on, ahead, *[  # steps and instants in one axis
+            x.reshape(x.shape[0] * x.shape[1], *x.shape[2:]) for x in given],
+            int(s.backend.tables.motion_varies)])
         done = self._call(kernel, y, dt, (rows, memories[:, :2]), self._rule, data, self._state,
                           self._work, memories, rows, multipliers, points)
         history = memories[:, 2:] if lasting or y.history is None else np.array([y.history] * done)
@@ -279,19 +250,15 @@ class Integrator:
 
         return Motions({name: x[:done] for name, x in zip(COLUMNS, columns)}, memory)
 
-    def _begin(self, y, dt, n, given):
-        """The kernel, its functions of time, and an array for what a step has at its points."""
+    def _begin(self, y, dt, n):
+        """The kernel, 1 if it continues a step, its extrapolation, and an array for what steps have
+        at their points."""
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
-        joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
-                              int(self.system.backend.tables.motion_varies))
-        return steps, StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
-                               given.factors[:, -1].copy(), given.supports[:, -1].copy(),
-                               joints), np.empty((n, 0, 0))
+        return steps, 0, np.zeros((0, 0)), np.empty((n, 0, 0))
 
     def _call(self, function: Callable, y: Motion, dt: float, out: tuple[Array, Array],
               *args: Any) -> int:
@@ -341,10 +308,6 @@ class Integrator:
                     self._lost = text
                     return k
         return done
-
-    @property
-    def _backend(self):
-        return self.system.backend
 
     def take(self, y: Motion, dt: float) -> Motion:
         """One step of size dt from the Motion ``y``; raises TimeStepFailed."""
@@ -401,7 +364,7 @@ class Integrator:
             other.limit = self.limit
             begin = other.start(y.u, y.v, y.t, dt)
             begin.dissipated = y.dissipated
-        for factor in LEAPS:
+        for factor in (1.5, 2.3, 3.7, 6.1, 11.0, 23.0):  # times the step size
             with suppress(TimeStepFailed):
                 return other.attempt(begin, factor * dt)
         return None
@@ -480,33 +443,15 @@ def _couplings(system):
     return i[kept], j[kept], values[kept]
 
 
-def _damping(system):
-    """The low-rank rows beside the band, and the Dampers of a system."""
-    modes, M = system.modal_damping.rows, system.mass
-    rows = np.concatenate([modes, system.forces.border_rows])
-    k = len(rows)
-    D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))
-    return (LowRankRows(rows, np.zeros((k, k)), np.zeros(rows.shape), np.zeros((k, k))),
-            Dampers(int(system.damped), int(system.viscous), int(system.forces.resists),
-                    system.damping.mass, D, modes))
-
-
-#: Samples of functions of time in a step of collocation: Chebyshev points.
-CHEBYSHEV = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
-
-
 class StageIntegrator(Integrator):
     """Integrates a system by collocation, as an Integrator."""
 
     scheme: Collocation
 
     @cached_property
-    def _backend(self):
-        return self.system.backend.copied(len(self.scheme.points))
-
-    @cached_property
     def _functions(self):
-        return TimeFunctions(self.system, np.append(self.scheme.points, 1.0), CHEBYSHEV)
+        chebyshev = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
+        return TimeFunctions(self.system, np.append(self.scheme.points, 1.0), chebyshev)
 
     @cached_property
     def _work(self):
@@ -523,7 +468,7 @@ class StageIntegrator(Integrator):
             np.zeros((2 * k, b, N)), np.zeros((2, rows, rows)), np.zeros((2, m, N)),
             np.zeros((m, m)), np.zeros(m), D, method])
 
-    def _begin(self, y, dt, n, given):
+    def _begin(self, y, dt, n):
         s, w, table, memory = self.system, self._work, self.scheme.table, y.memory or {}
         w.y[0], w.y[1], w.first[:] = y.u, y.v, y.multipliers
         ahead = table.method.ahead
@@ -533,12 +478,7 @@ class StageIntegrator(Integrator):
             ahead = ahead if dt == y.before else table.ahead(dt / y.before)
         else:
             w.guess[:] = 0.5 * (dt * table.points[:, None])**2 * y.acceleration
-        times, factors, supports, c, g = (  # steps and instants in one axis
-            np.ascontiguousarray(x).reshape(len(x) * x.shape[1], *x.shape[2:]) for x in (
-                given.times, given.factors, given.supports, given.c, given.g[:, :, [0, 0, 1, 2]]))
-        joints = JointMotions(c, g, int(s.backend.tables.motion_varies))
-        return collocate, Interval(float(dt), int("points" in memory), ahead, times, factors,
-                                   supports, joints), np.empty((n, len(w.U), s.N + self.m))
+        return collocate, int("points" in memory), ahead, np.empty((n, len(w.U), s.N + self.m))
 
     def filtered(self, du: Array) -> Array:
         s, w = self.system, self._work

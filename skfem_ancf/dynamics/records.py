@@ -7,7 +7,8 @@ import numpy as np
 from ..actions.forces.kernels import add_resisting_force, settle_contact, settle_elements
 from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import accept_body, add_viscous_force, body_tangent
-from ..core.band import Band, clear, dot, multiply, solve, solve_dependent, subtract_rows
+from ..core.band import (Band, add_multiple, clear, copy, dot, multiply, solve, solve_dependent,
+                         solve_many, subtract_rows)
 from ..core.callbacks import JOINTS, call_custom
 from ..core import C2, F1, F2, F3, I1, MADE, apart, indices, source
 from ..equations.tables import Equations
@@ -45,13 +46,10 @@ def damping_force(e, dampers, M, t, u, v, mixed, out, scratch):
         add_resisting_force(e.forces, t, u, v, out)
     if dampers.mass > 0.0:
         multiply(M, v, scratch)
-        for i in indices(out.size):
-            out[i] += dampers.mass * scratch[i]
+        add_multiple(dampers.mass, scratch, out)
     for k in range(dampers.modes.shape[0]):
         row = dampers.modes[k]
-        size = dot(row, v)
-        for i in indices(out.size):
-            out[i] += size * row[i]
+        add_multiple(dot(row, v), row, out)
 
 
 @source
@@ -61,32 +59,22 @@ def add_damping(viscous, dampers, M, factor, u, stresses, scratch, A):
     if dampers.viscous > 0:
         yes = dampers.viscous > 0
         body_tangent(viscous, u, scratch, stresses[0], yes, stresses[2], dampers.D)
-        for i in indices(A.flat.size):
-            A.flat[i] += factor * dampers.D.flat[i]
+        add_multiple(factor, dampers.D.flat, A.flat)
     if dampers.mass > 0.0:
-        for i in indices(A.flat.size):
-            A.flat[i] += factor * dampers.mass * M.flat[i]
+        add_multiple(factor * dampers.mass, M.flat, A.flat)
 
 
 @apart("rows", Band, LowRankRows, F1)
 def factorize_rows(A, rows, free):
     """Set Z and H with the factors of A."""
-    P, S, Z, H = rows.P, rows.S, rows.Z, rows.H
-    k = P.shape[0]
-    G = np.empty((k, k))
-    for a in range(k):  # Z = P A^-1
-        row, out = P[a], Z[a]
+    P, Z, H = rows.P, rows.Z, rows.H
+    for a in range(P.shape[0]):  # Z = P A^-1
         for i in indices(free.size):
-            out[i] = row[i] * free[i]
-        solve(A, out)
-    for a in range(k):
-        for b in range(k):
-            G[a, b] = dot(P[a], Z[b])
-    for a in range(k):
-        for b in range(k):
-            H[a, b] = 1.0 if a == b else 0.0
-            for c in range(k):
-                H[a, b] += S[a, c] * G[c, b]
+            Z[a, i] = P[a, i] * free[i]
+    solve_many(A, Z)
+    np.dot(rows.S, np.dot(P, Z.T), H)
+    for a in range(P.shape[0]):
+        H[a, a] += 1.0
 
 
 @source
@@ -100,14 +88,8 @@ def solve_rows(A, rows, x):
 @apart("rows", LowRankRows, F1)
 def _correct_rows(rows, x):
     """The part of :func:`solve_rows` beside the band."""
-    k = rows.P.shape[0]
-    y, z, H = np.empty(k), np.zeros(k), rows.H.copy()
-    for a in range(k):
-        y[a] = dot(rows.P[a], x)
-    for a in range(k):
-        for c in range(k):
-            z[a] += rows.S[a, c] * y[c]
-    solve_dependent(H, z)
+    z = np.dot(rows.S, np.dot(rows.P, x))
+    solve_dependent(rows.H.copy(), z)
     subtract_rows(rows.Z, z, x)
 
 
@@ -121,27 +103,17 @@ _SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
 class JointMotion(NamedTuple):
     """Time-dependent terms of the joints at one instant, see :mod:`skfem_ancf.actions.tables`."""
 
-    c: F2  # c at the end of a step, and its first two rates, (3, m)
-    g: F2  # g there, g where the joints act, and the first two rates of g, (4, k)
+    c: F2  # c and its first two rates, (3, m)
+    g: F2  # the same of g, (3, k)
     drives: int  # 1 if a joint moves
-
-
-class JointMotions(NamedTuple):
-    """The same at several instants, a row for each, or one row if constant."""
-
-    c: F3
-    g: F3
-    drives: int
 
 
 @apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1)
 def drive_rate(joints, motion, t, dt, u, out):
     """The partial rate of Phi, c' + g' . u, at the end t of a step of dt."""
-    c = motion.c[1]
-    for k in indices(out.size):
-        out[k] = c[k]
+    copy(motion.c[1], out)
     if joints.custom == 0:
-        add_products(out, joints.gk, motion.g[2], u, joints.gi)
+        add_products(out, joints.gk, motion.g[1], u, joints.gi)
     elif motion.drives > 0:
         _add_differences(joints, t, dt, u, u, PARTS / dt, 0.0, 0.0, out)
 
@@ -149,12 +121,11 @@ def drive_rate(joints, motion, t, dt, u, out):
 @apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1, F1)
 def acceleration_of_joints(joints, motion, t, dt, u, v, out):
     """The second rate of Phi without accelerations: c'' + v . H v + g'' . u + 2 g' . v."""
-    c, g = motion.c[2], motion.g[2]
-    for k in indices(out.size):
-        out[k] = c[k]
+    g = motion.g[1]
+    copy(motion.c[2], out)
     if joints.custom == 0:
         add_triples(out, joints.hk, joints.hv, v, joints.hi, v, joints.hj)
-        add_products(out, joints.gk, motion.g[3], u, joints.gi)
+        add_products(out, joints.gk, motion.g[2], u, joints.gi)
         add_products(out, joints.gk, g, v, joints.gi)
         add_products(out, joints.gk, g, v, joints.gi)
     else:
@@ -173,11 +144,9 @@ def _add_differences(joints, t, dt, u, v, first, second, along, out):
         for k in range(2):
             c = first * _FIRST[part] + second * _SECOND[part] if k == 0 else along * _FIRST[part]
             if c != 0.0:
-                for i in indices(out.size):
-                    values[i] = 0.0
+                clear(values)
                 call_custom(JOINTS, joints.custom, 7 + k, time, 1.0, u, v, values)
-                for i in indices(out.size):
-                    out[i] += c * values[i]
+                add_multiple(c, values, out)
 
 
 class Rule(NamedTuple):
@@ -206,15 +175,19 @@ class Matrices(NamedTuple):
     dampers: Dampers
 
 
-class StepData(NamedTuple):
-    """Functions of time for a block of steps; one row if constant."""
+class Interval(NamedTuple):
+    """Prescribed functions at p instants of s steps; one row if constant. The last instant is the
+    end of the step, the others are the points of collocation, or that of the equation of motion."""
 
-    dt: float
-    times: F2  # ends of the steps, and instants of their equations of motion, (n, 2)
-    factors: F2  # of the loads, (n, l)
-    ends: F2  # the same at the ends of the steps
-    supports: F3  # displacement, velocity, acceleration of fixed DOFs, else 0, (n, 3, N)
-    joints: JointMotions
+    h: float  # step size
+    begun: int  # of collocation: 1 if there is a previous step
+    ahead: F2  # and Method.ahead for the first step
+    times: F1  # (s p,)
+    factors: F2  # of the loads, (s p, l)
+    constrained: F3  # displacement, velocity and acceleration of fixed DOFs, else 0, (s p, 3, N)
+    c: F3  # of the joints, (s p, 3, m)
+    g: F3  # (s p, 3, k)
+    drives: int  # 1 if a joint moves
 
 
 class Step(NamedTuple):
@@ -223,10 +196,11 @@ class Step(NamedTuple):
     dt: float
     t: float  # end of the step
     t_force: float  # instant of the equation of motion
-    factors: F1  # as in StepData
-    ends: F1
-    supports: F2
+    factors: F1  # of the loads then
+    ends: F1  # and at the end
+    supports: F2  # displacement, velocity, acceleration of fixed DOFs, else 0, (3, N)
     joints: Annotated[JointMotion, MADE]
+    g: F1  # of the joints, where they act
     mass_factor: float
     damping_factor: float
     stiffness_factor: float
@@ -308,7 +282,7 @@ class StepState(NamedTuple):
     guess: I1  # 1 while margins alone say that members do not touch
 
 
-# named tuples of collocation: coefficients, prescribed functions, work arrays
+# named tuples of collocation: coefficients, work arrays
 
 class Method(NamedTuple):
     """Coefficients of a method of n points and k eigenvalues, one of each conjugate pair. Complex
@@ -322,18 +296,6 @@ class Method(NamedTuple):
     to: F3  # rows of T^-1, (2, k, n)
     back: F3  # columns of T, doubled for pairs, (2, n, k)
     ahead: F2  # extrapolation from c to 1 + c by monomials of degree 2 and above, (n, n)
-
-
-class Interval(NamedTuple):
-    """Prescribed functions at the points and the end of s steps; one row if constant."""
-
-    h: float  # step size
-    begun: int  # 1 if there is a previous step
-    ahead: F2  # Method.ahead for the first step
-    times: F1  # (s (n + 1),)
-    factors: F2  # of the loads, (s (n + 1), l)
-    constrained: F3  # displacement, velocity and acceleration of fixed DOFs, (s (n + 1), 3, N)
-    joints: JointMotions
 
 
 class StageWork(NamedTuple):
@@ -377,14 +339,23 @@ ALL = Equations, Matrices, Annotated[Rule, MADE], Annotated[Step, MADE], Work, S
 
 
 @source
-def settle(e, t, along, u0, u1, v1, taken):
-    """Update the history at the end of a step; ``taken`` is the dissipated work."""
+def settle(e, t, along, u0, u1, v1, state, history):
+    """Update the history at the end of a step, which is written to ``history``."""
     # ``t`` are the instants of the forces of contact and of the end. Contact works from u0 to u1 in
     # the time ``along`` of a conserving step, or at u1 if that is 0.
+    taken = np.empty(1)  # the dissipated work
     settle_contact(e.forces, t[0], along, u0 if along != 0.0 else u1, u1, taken)
     settle_elements(e.forces, t[1], u0, u1, v1, taken)
     accept_body(e.body, u0, u1, taken)
     e.span[0] = 0.0
+    state.dissipated[0] += taken[0]
+    copy(e.history, history)
+
+
+@source
+def kinetic_energy(M, v, scratch):
+    multiply(M, v, scratch)
+    return 0.5 * dot(v, scratch)
 
 
 @source
@@ -399,20 +370,19 @@ def mass_factor(rule, dt):
 
 
 @source
-def damping_factor(rule, dt):
-    """dv / du_1, the factor of D in the iteration matrix."""
-    return (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / dt
+def motion_at(s, k):
+    """The JointMotion at an instant of an Interval."""
+    return JointMotion(row_of(s.c, k), row_of(s.g, k), s.drives)
 
 
 @source
 def step_of(joints, rule, block, n):
     """The :class:`Step` number n."""
-    c, g = block.joints.c, block.joints.g
+    at, end, h = 2 * n, 2 * n + 1, block.h
     constant = joints.hk.size == 0 and joints.custom == 0
-    kept = constant and g.shape[0] == 1 and n > 0
-    joints_now = JointMotion(row_of(c, n), row_of(g, n), block.joints.drives)
-    return Step(block.dt, block.times[n, 0], block.times[n, 1],
-                row_of(block.factors, n), row_of(block.ends, n), row_of(block.supports, n),
-                joints_now,
-                mass_factor(rule, block.dt), damping_factor(rule, block.dt),
-                0.5 if rule.conserving > 0 else 1.0, constant, kept)
+    damping_factor = (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / h  # dv / du_1
+    return Step(h, block.times[end], block.times[at], row_of(block.factors, at),
+                row_of(block.factors, end), row_of(block.constrained, end), motion_at(block, end),
+                row_of(block.g, at)[0], mass_factor(rule, h), damping_factor,
+                0.5 if rule.conserving > 0 else 1.0, constant,
+                constant and block.g.shape[0] == 1 and n > 0)

@@ -288,17 +288,6 @@ class Run:
         # only the last step may be shorter, so that factors can be reused
         self._whole = self._count if even and self._last else self._count - 1
 
-    def _turn(self, y):
-        """Start the next segment after a breakpoint, with new accelerations and rates."""
-        self._segment, self._n = self._segment + 1, 0
-        self._limit()
-        if self._sizes is not None:
-            self._size = FIRST * self.task.span
-            self._sizes.averages = np.zeros_like(self._sizes.averages)
-        turned = self._begin_segment(y.u, y.v, y.history, False)
-        turned.dissipated, turned.start, turned.parts = y.dissipated, y.start, y.parts or [y]
-        return self._follow(y.turns, turned)
-
     def _time(self, n):
         """Time after n steps of the segment."""
         return self._begun + n * self._size if n < self._count else self._end
@@ -306,18 +295,40 @@ class Run:
     # steps
 
     def advance(self) -> None:
-        """Take a step, or a block of steps; raises TimeStepFailed."""
-        if self._sizes is not None:
-            self._automatic()
-            return
+        """Take a step or a block of steps, or reject a step; raises TimeStepFailed."""
         if self._in_blocks and self._n < self._whole and self._block():
             return
-        old, h = self.y, self._end - self.y.t
-        if self._n < self._count - 1 or abs(h - self._size) < 1e-9 * self._size:
-            h = self._size
-        new = self.integrator.step(old, h)
-        new.t = self._time(self._n + 1)
-        self._commit(old, new)
+        y, left = self.y, self._end - self.y.t
+        if self._sizes is None:
+            whole = self._n < self._count - 1 or abs(left - self._size) < 1e-9 * self._size
+            new = self.integrator.step(y, self._size if whole else left)
+            new.t = self._time(self._n + 1)
+            self._commit(y, new)
+            return
+        h = self._sizes.cut(y.t, min(self._size, left))
+        if left < (1 + 1e-3) * h:
+            h = left
+        elif left < 2 * h:
+            h = 0.5 * left
+        touches = self.system.forces.contacts.obstacles  # halved steps find the time of impact
+        try:
+            new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
+            error = self._sizes.error(self.integrator, y, new, h)
+            self._size, kept = self._sizes.next(error, h, self._size)
+        except TimeStepFailed:
+            if h < SHORTEST * self.task.span:
+                raise
+            self._size, kept, self._stuck = 0.5 * h, False, self._stuck + 2
+            past = self.integrator.leap(y, h) if self._stuck >= 2 * DEPTH else None
+            if past is not None and past.t < self._end:
+                new, h, kept, self._stuck = past, past.t - y.t, True, 0
+        if not kept:
+            self.rejected += 1
+            return
+        self._stuck = max(0, self._stuck - 1)
+        if h == left:
+            new.t = self._end
+        self._commit(y, new)
 
     def _block(self):
         """Take a block of steps of one size; False if none succeeded."""
@@ -349,34 +360,6 @@ class Run:
             raise KeyboardInterrupt
         return True
 
-    def _automatic(self):
-        """Take one step of automatic size, or reject it."""
-        y, left = self.y, self._end - self.y.t
-        h = self._sizes.cut(y.t, min(self._size, left))
-        if left < (1 + 1e-3) * h:
-            h = left
-        elif left < 2 * h:
-            h = 0.5 * left
-        touches = self.system.forces.contacts.obstacles  # halved steps find the time of impact
-        try:
-            new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
-            error = self._sizes.error(self.integrator, y, new, h)
-            self._size, kept = self._sizes.next(error, h, self._size)
-        except TimeStepFailed:
-            if h < SHORTEST * self.task.span:
-                raise
-            self._size, kept, self._stuck = 0.5 * h, False, self._stuck + 2
-            past = self.integrator.leap(y, h) if self._stuck >= 2 * DEPTH else None
-            if past is not None and past.t < self._end:
-                new, h, kept, self._stuck = past, past.t - y.t, True, 0
-        if not kept:
-            self.rejected += 1
-            return
-        self._stuck = max(0, self._stuck - 1)
-        if h == left:
-            new.t = self._end
-        self._commit(y, new)
-
     def _commit(self, old, new):
         """Accept a step: find events, pass breakpoints, record and store."""
         def value(y):
@@ -392,7 +375,15 @@ class Run:
                 new = self._interpolated(old, new, root)
                 self.event = new.t
         if self.event is None and new.t >= self._end and not self._last:
-            new = self._turn(new)
+            # the next segment has new accelerations and rates
+            self._segment, self._n, end = self._segment + 1, 0, new
+            self._limit()
+            if self._sizes is not None:
+                self._size = FIRST * self.task.span
+                self._sizes.averages = np.zeros_like(self._sizes.averages)
+            new = self._begin_segment(end.u, end.v, end.history, False)
+            new.dissipated, new.start, new.parts = end.dissipated, end.start, end.parts or [end]
+            self._follow(end.turns, new)
             if self._until is not None:  # a change of sign at a breakpoint is an event there
                 before, self._value = self._value, value(new)
                 if before * self._value < 0.0:

@@ -14,19 +14,18 @@ from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, a
 from ..beam.strain_energy import (add_force_of, add_viscous_stress, body_force, body_linearised,
                                   body_mean_stress, body_mixed, body_stress, body_tangent)
 from ..core.band import (add_multiple, clear, copy, factorize, factorize_complex, fix, fix_stored,
-                         multiply, solve, solve_columns, solve_dependent, solve_joined)
+                         multiply, solve, solve_columns, solve_dependent, solve_joined,
+                         subtract_rows)
 from ..core import indices, shaped, source
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
                                      SINGULAR, correction_size, judged, motion_size,
                                      noise_of_step)
-from .records import (ITERATIONS, JointMotion, acceleration_of_joints, add_damping,
-                      damping_force, drive_rate, row_of, settle)
+from .records import (ITERATIONS, acceleration_of_joints, add_damping, damping_force, drive_rate,
+                      kinetic_energy, motion_at, row_of, settle)
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
 #: steps.
 REUSED, MIXED, LASTING = 0.3, 0.5, 32
-#: Newton corrections of the joints at the end of a step.
-CLOSINGS = 2
 
 
 @source
@@ -40,12 +39,8 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     """Factorise the iteration matrices at the mean of the points; False on failure."""
     origin, f, S, yes = w.origins[0], w.x[0], w.stresses, w.x.size > 0
     at, e.span[0] = step * (method.points.size + 1), s.h
-    for i in indices(origin.size):
-        origin[i] = 0.0
-    for k in range(method.points.size):
-        add_multiple(method.weights[k], w.U[k], origin)
-    for k in range(1, method.points.size):
-        copy(origin, w.origins[k])
+    np.dot(method.weights, w.U, origin)
+    w.origins[1:] = origin
     if state.mixed_steps[0] > 0:
         body_mean_stress(e.body, e.copies, method.weights, w.independent, S[1])
     else:
@@ -53,9 +48,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
     add_load_stiffness(e.loads, row_of(s.factors, at), s.times[at], 1.0, origin, e.K)
     add_element_tangent(e.forces, s.times[at], origin, e.K)
-    D = w.D.flat
-    for i in indices(D.size):
-        D[i] = 0.0
+    clear(w.D.flat)
     if matrices.dampers.active > 0:
         add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
         if matrices.dampers.elements > 0:
@@ -81,30 +74,25 @@ def factorize_stages(e, matrices, method, s, w, state, step):
         for j in range(w.J.shape[0]):
             x, y = w.Y[2 * k, j], w.Y[2 * k + 1, j]
             copy(w.J[j], x)
-            for i in indices(y.size):
-                y[i] = 0.0
+            clear(y)
             solve_for(w, k, x, y)
-        _form_schur_complement(w, s.h, k)
+        if w.J.shape[0] > 0:
+            _form_schur_complement(w, s.h, k)
     return True
 
 
 @source
 def _form_schur_complement(w, h, k):
     """Schur complement of the low-rank rows for the eigenvalue k."""
-    q, Q, b, m, values = w.q, w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
-    for a in range(b):
-        for j in range(b):
-            re, im = np.dot(w.J[a], w.Y[2 * k, j]), np.dot(w.J[a], w.Y[2 * k + 1, j])
-            q[j, a], q[b + j, b + a], q[b + j, a], q[j, b + a] = re, re, -im, im  # its columns
-    if b > m:
-        for j in range(2 * b):
-            _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, q[j])
+    q, b, m, values = w.q, w.J.shape[0], w.l.shape[1], w.method.values
+    re, im = np.dot(w.Y[2 * k], w.J.T), np.dot(w.Y[2 * k + 1], w.J.T)
+    q[:b, :b], q[b:, b:], q[b:, :b], q[:b, b:] = re, re, -im, im  # its columns
+    for j in range(2 * b if b > m else 0):
+        _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, q[j])
     for a in range(m, b):
         q[a, a] += 1.0
         q[b + a, b + a] += 1.0
-    for a in range(2 * b):
-        for j in range(2 * b):
-            Q[a, j] = q[j, a]
+    w.Q[k] = q.T
 
 
 @source
@@ -112,7 +100,7 @@ def _rows(e, matrices, s, w, at):
     """Set the low-rank rows at the mean of the points, and the coupling of those of no joint."""
     m, forces, t = w.l.shape[1], e.forces, s.times[at]
     if m > 0:
-        joint_directions(e.joints, row_of(s.joints.g, at)[0], t, w.origins[0], w.J[:m])
+        joint_directions(e.joints, row_of(s.g, at)[0], t, w.origins[0], w.J[:m])
     for a in range(matrices.rows.P.shape[0]):
         copy(matrices.rows.P[a], w.J[m + a])
     for a in range(w.J.shape[0]):
@@ -132,17 +120,9 @@ def _rows(e, matrices, s, w, at):
 @source
 def _stiffen(S, p, z, m, column):
     """The last rows of a column of ``q f = r`` times ``C = S[0] + (p + i z) S[1]``."""
-    k, b = S.shape[1], column.size // 2
-    scratch = np.empty(2 * k)
-    for a in range(k):
-        scratch[a], scratch[k + a] = column[m + a], column[b + m + a]
-    for a in range(k):
-        re, im = 0.0, 0.0
-        for c in range(k):
-            C, D = S[0, a, c] + p * S[1, a, c], z * S[1, a, c]
-            re += C * scratch[c] - D * scratch[k + c]
-            im += C * scratch[k + c] + D * scratch[c]
-        column[m + a], column[b + m + a] = re, im
+    b = column.size // 2
+    C, D, x, y = S[0] + p * S[1], z * S[1], column[m:b].copy(), column[b + m:].copy()
+    column[m:b], column[b + m:] = np.dot(C, x) - np.dot(D, y), np.dot(C, y) + np.dot(D, x)
 
 
 @source
@@ -163,29 +143,23 @@ def solve_for(w, k, x, y):
 def join(method, s, w, k, r, q, x, y):
     """Correct x + i y, solved with the band, by forces r along the low-rank rows J. For joints ``mu
     / h J x = -gap``; the force of other rows is ``C J x``."""
-    m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
+    m, b = w.l.shape[1], w.J.shape[0]
     p, z = method.values[0, k], method.values[1, k]
     c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
-    for a in range(b):
-        J = w.J[a]
-        r[a], r[b + a] = np.dot(J, x), np.dot(J, y)
-    for a in range(m):
-        re, im = 0.0, 0.0
-        for j in range(n):
-            re += method.to[0, k, j] * w.gaps[j, a]
-            im += method.to[1, k, j] * w.gaps[j, a]
-        r[a] += c * re - d * im
-        r[b + a] += c * im + d * re
+    r[:b], r[b:] = np.dot(w.J, x), np.dot(w.J, y)
+    for j in range(method.points.size if m > 0 else 0):
+        re, im = method.to[0, k, j], method.to[1, k, j]
+        add_multiple(c * re - d * im, w.gaps[j], r[:m])
+        add_multiple(c * im + d * re, w.gaps[j], r[b:b + m])
     if b > m:
         _stiffen(w.S, p / s.h, z / s.h, m, r)
     copy(flat_points(w.Q[k]), flat_points(q))
     if not solve_dependent(q, r):
         return False
-    for a in range(b):
-        re, im, f, g = w.Y[2 * k, a], w.Y[2 * k + 1, a], r[a], r[b + a]
-        for i in indices(x.size):
-            x[i] -= f * re[i] - g * im[i]
-            y[i] -= f * im[i] + g * re[i]
+    subtract_rows(w.Y[2 * k], r[:b], x)
+    subtract_rows(w.Y[2 * k + 1], -r[b:], x)
+    subtract_rows(w.Y[2 * k + 1], r[:b], y)
+    subtract_rows(w.Y[2 * k], r[b:], y)
     return True
 
 
@@ -213,7 +187,6 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
     # Written for each step as by :func:`~skfem_ancf.dynamics.steps.steps`, w is the acceleration;
     # and displacements and multipliers of the points, (s, n, N + m).
     method = w.method
-    taken = np.empty(1)
     if e.lasting > 0:
         set_contact_rate(e.forces, s.h)
     for k in range(rows.shape[0]):
@@ -232,18 +205,10 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
             if e.lasting >= MATERIALS:
                 carry_eigenstrains(e.loads, row_of(
                     s.factors, (k + 1) * (method.points.size + 1) - 1))
-            settle(e, (t, t), 0.0, w.before[0], w.y[0], w.y[1], taken)
-            state.dissipated[0] += taken[0]
-            copy(e.history, memories[k, 2:])
+            settle(e, (t, t), 0.0, w.before[0], w.y[0], w.y[1], state, memories[k, 2:])
         state.last_dt[0], state.mixed_steps[0] = s.h, max(0, state.mixed_steps[0] - 1)
-        for j in range(4):
-            copy(w.y[min(j, 2)], rows[k, j])
-        for j in range(method.points.size):
-            copy(w.U[j], points[k, j, :e.free.size])
-            copy(w.l[j], w.first[j])
-            copy(w.l[j], points[k, j, e.free.size:])
-        for j in range(2):
-            copy(w.shares, multiplier_rows[k, j])
+        rows[k, :3], rows[k, 3], multiplier_rows[k], w.first[:] = w.y, w.y[2], w.shares, w.l
+        points[k, :, :e.free.size], points[k, :, e.free.size:] = w.U, w.l
         memories[k, 1] = 1.0  # what points lead through
         memories[k, 0] = state.dissipated[0]  # last: the step is complete
     return rows.shape[0]
@@ -254,17 +219,13 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     """Iterate to the points of a step, which sets U, V and W; False on failure."""
     n, scratch, status, u0 = method.points.size, w.x[0], GO_ON, w.y[0]
     rates = w.gaps.size > 0 or matrices.dampers.active > 0
-    multiply(matrices.M, u0, scratch)
-    largest = 0.0
-    for k in range(method.values.shape[1]):
-        a, b = method.values[0, k], method.values[1, k]
-        largest = max(largest, (a * a + b * b) / (s.h * s.h))
+    largest = np.max(method.values[0]**2 + method.values[1]**2) / (s.h * s.h)
     reference = motion_size(state.energy[0])
-    noise = noise_of_step(rule, 1.0, largest, abs(np.dot(u0, scratch)))
+    noise = noise_of_step(rule, 1.0, largest, abs(2.0 * kinetic_energy(matrices.M, u0, scratch)))
     state.fresh[0], state.correction[0] = 0, -1.0
     if state.mixed_steps[0] > 0:
         state.factors[0] = 0  # the beam has rotated since
-    _start(e, matrices, method, s, w, state, step)
+    _start(e, method, s, w, state, step)
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w, step, rates)
         if state.factors[0] == 0:
@@ -288,7 +249,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if status == GO_ON and state.fresh[0] > 0 and e.lasting < MATERIALS and lost:
             state.mixed_steps[0], status = LASTING, RESTART  # with the same factors
         if status == RESTART:
-            _start(e, matrices, method, s, w, state, step)
+            _start(e, method, s, w, state, step)
         elif status != GO_ON:
             break
         elif state.mixed_steps[0] > 0:
@@ -296,9 +257,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
                             w.independent)
             if matrices.dampers.viscous > 0:  # and by the rates of the correction R
                 for k in range(n):
-                    clear(scratch)
-                    for j in range(n):
-                        add_multiple(method.first[k, j] / s.h, w.R[j], scratch)
+                    np.dot(method.first[k] / s.h, w.R, scratch)
                     add_viscous_stress(e.viscous, e.body, e.copies, k, w.origins[0], scratch,
                                        w.stresses, w.independent)
     _states(e.free, method, s, w, step, True)
@@ -342,7 +301,7 @@ def _end(e, matrices, method, s, w, state, step):
         copy(w.U[n - 1], u)
         copy(w.V[n - 1], v)
         copy(w.W[n - 1], a)
-    constrained, motion = row_of(s.constrained, first + n), motion_at(s.joints, first + n)
+    constrained, motion = row_of(s.constrained, first + n), motion_at(s, first + n)
     joined = w.shares.size > 0
     for i in indices(u.size):
         u[i] = u[i] * e.free[i] + constrained[0, i]
@@ -357,8 +316,7 @@ def _end(e, matrices, method, s, w, state, step):
             return False
         if ends:
             add_multiple(1.0, w.l[n - 1], w.shares)
-    multiply(matrices.M, v, scratch)
-    state.energy[0] = max(state.energy[0], 0.5 * np.dot(v, scratch))
+    state.energy[0] = max(state.energy[0], kinetic_energy(matrices.M, v, scratch))
     return True
 
 
@@ -390,16 +348,14 @@ def _close(e, matrices, s, w, motion, t, step):
     """Project u onto the joints in the mass norm, and v onto their rates."""
     u, v, g, x = w.y[0], w.y[1], motion.g[0], w.x[3]
     bends = e.joints.hk.size > 0 or e.joints.custom > 0  # J depends on u or t
-    turns = step == 0 or s.joints.g.shape[0] > 1
-    for k in range(CLOSINGS):
+    turns = step == 0 or s.g.shape[0] > 1
+    for k in range(2):  # Newton corrections
         joint_directions(e.joints, g, t, u, w.end[0])
         constraint(e.joints, motion.c[0], g, t, u, w.shares)
-        for i in indices(x.size):
-            x[i] = 0.0
+        clear(x)
         if not _meet(matrices.mass, e.free, w, x, bends or (turns and k == 0)):
             return False
-        for i in indices(x.size):
-            u[i] += x[i]
+        add_multiple(1.0, x, u)
     joint_directions(e.joints, g, t, u, w.end[0])
     drive_rate(e.joints, motion, t, s.h, u, w.shares)
     return _meet(matrices.mass, e.free, w, v, bends)
@@ -413,15 +369,12 @@ def _meet(mass, free, w, x, anew):
 
 
 @source
-def _start(e, matrices, method, s, w, state, step):
+def _start(e, method, s, w, state, step):
     """Set the initial guess; in the mixed iteration from the mean acceleration of the last step."""
     # A polynomial through the vibrations of a stiff beam extrapolates badly.
-    for k in range(w.Z.shape[0]):
-        copy(w.guess[k], w.Z[k])
-        copy(w.first[k], w.l[k])
+    w.Z[:], w.l[:] = w.guess, w.first
     if state.mixed_steps[0] > 0:
-        for k in range(w.R.shape[0]):
-            copy(w.y[0], w.R[k])
+        w.R[:] = w.y[0]
         body_stress(e.copies, flat_points(w.R), w.independent)
         if step > 0 or s.begun > 0:
             v0, v = w.y[1], w.before[1]
@@ -434,29 +387,19 @@ def _start(e, matrices, method, s, w, state, step):
 @source
 def _states(free, method, s, w, step, rates):
     """Set displacements, accelerations and, if ``rates``, velocities of the points."""
-    u0, v0, n, N = w.y[0], w.y[1], method.points.size, free.size
-    for k in range(n):
+    u0, v0 = w.y[0], w.y[1]
+    np.dot(method.second, w.Z, w.W)
+    if rates:
+        np.dot(method.first, w.Z, w.V)
+    for k in range(method.points.size):
         U, V, W, Z, c = w.U[k], w.V[k], w.W[k], w.Z[k], s.h * method.points[k]
-        constrained = row_of(s.constrained, step * (n + 1) + k)
-        for i in indices(N):
+        constrained = row_of(s.constrained, step * (method.points.size + 1) + k)
+        for i in indices(free.size):
             U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + constrained[0, i]
-            W[i] = 0.0
-        for j in range(n):
-            add_multiple(method.second[k, j] / (s.h * s.h), w.Z[j], W)
-        for i in indices(N):
-            W[i] = W[i] * free[i] + constrained[2, i]
+            W[i] = W[i] / (s.h * s.h) * free[i] + constrained[2, i]
         if rates:
-            copy(v0, V)
-            for j in range(n):
-                add_multiple(method.first[k, j] / s.h, w.Z[j], V)
-            for i in indices(N):
-                V[i] = V[i] * free[i] + constrained[1, i]
-
-
-@source
-def motion_at(joints, k):
-    """The JointMotion at a point."""
-    return JointMotion(row_of(joints.c, k), row_of(joints.g, k), joints.drives)
+            for i in indices(free.size):
+                V[i] = (v0[i] + V[i] / s.h) * free[i] + constrained[1, i]
 
 
 @source
@@ -491,14 +434,12 @@ def _residual(e, matrices, method, s, w, state, step, k):
     add_elastic_force(e.forces, t, 0.0, u, u, 0, f)
     if matrices.dampers.active > 0:
         damping_force(e, matrices.dampers, matrices.M, t, u, v, state.mixed_steps[0], d, scratch)
-        for i in indices(f.size):
-            f[i] += d[i]
+        add_multiple(1.0, d, f)
     external_force(e.loads, row_of(s.factors, at), t, 1.0, u, Q)
     multiply(matrices.M, w.W[k], scratch)
-    for i in indices(f.size):
-        f[i] += scratch[i]
+    add_multiple(1.0, scratch, f)
     if w.gaps.shape[1] > 0:
-        gap, l, motion = w.gaps[k], w.l[k], motion_at(s.joints, at)
+        gap, l, motion = w.gaps[k], w.l[k], motion_at(s, at)
         g = motion.g
         add_joint_force(e.joints, g[0], t, u, l, f)
         drive_rate(e.joints, motion, t, s.h * method.points[k], u, gap)
@@ -511,17 +452,13 @@ def _residual(e, matrices, method, s, w, state, step, k):
 def _correct(e, method, s, w, state):
     """Correct Z and the multipliers; R becomes the correction. False for dependent joints."""
     # V is used as work array.
-    n, N, m, b = method.points.size, e.free.size, w.l.shape[1], w.J.shape[0]
+    n, m, b = method.points.size, w.l.shape[1], w.J.shape[0]
     D, dl, x, y, r, q = w.V, w.dl, w.x[0], w.x[1], w.r, w.q
     clear(flat_points(D))
     clear(flat_points(dl))
     for k in range(method.values.shape[1]):
-        for i in indices(N):
-            x[i] = 0.0
-            y[i] = 0.0
-        for j in range(n):
-            add_multiple(method.to[0, k, j], w.R[j], x)
-            add_multiple(method.to[1, k, j], w.R[j], y)
+        np.dot(method.to[0, k], w.R, x)
+        np.dot(method.to[1, k], w.R, y)
         solve_for(w, k, x, y)
         if b > 0 and not join(method, s, w, k, r, q, x, y):
             return False
@@ -529,19 +466,14 @@ def _correct(e, method, s, w, state):
             c, d = method.back[0, j, k], method.back[1, j, k]
             add_multiple(c, x, D[j])
             add_multiple(-d, y, D[j])
-            for l in range(m):
-                dl[j, l] += c * r[l] - d * r[b + l]
-    for j in range(n):
-        gap, l, share = w.gaps[j], w.l[j], dl[j]
-        for a in range(m):
-            gap[a] = np.dot(w.J[a], D[j])  # that the correction closes
-            l[a] += share[a]
+            add_multiple(c, r[:m], dl[j])
+            add_multiple(-d, r[b:b + m], dl[j])
+    if m > 0:
+        np.dot(D, w.J[:m].T, w.gaps)  # that the correction closes
+        add_multiple(1.0, flat_points(dl), flat_points(w.l))
     state.last_correction[0] = state.correction[0]
     state.correction[0] = correction_size(e, flat_points(w.R), flat_points(D),
                                           flat_points(w.gaps), flat_points(dl))
-    for j in range(n):
-        Z, R, d = w.Z[j], w.R[j], D[j]
-        for i in indices(N):
-            Z[i] += d[i]
-            R[i] = d[i]
+    add_multiple(1.0, flat_points(D), flat_points(w.Z))
+    copy(flat_points(D), flat_points(w.R))
     return True

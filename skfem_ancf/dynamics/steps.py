@@ -33,7 +33,8 @@ from ..equations.convergence import (DEPENDENT, DONE, EXPECTED, FAILED, GO_ON, L
                                      SYMMETRIC, UNSETTLED, UNSYMMETRIC, correction_size,
                                      judged, motion_size, noise_of_step)
 from .records import (ALL, AUGMENTED, ITERATIONS, acceleration_of_joints, add_damping,
-                      damping_force, drive_rate, factorize_rows, settle, solve_rows, step_of)
+                      damping_force, drive_rate, factorize_rows, kinetic_energy, settle, solve_rows,
+                      step_of)
 
 
 #: Relative correction beyond which factors of the predicted end of a step are poor.
@@ -43,12 +44,6 @@ ROUGHLY, EXACTLY = range(2)
 
 
 # the residual of a step, ``Q - f - M a - J^T lambda``, at an iterate
-
-@source
-def kinetic_energy(M, v, scratch):
-    multiply(M, v, scratch)
-    return 0.5 * dot(v, scratch)
-
 
 @source
 def to_middle(rule, w):
@@ -83,32 +78,29 @@ def internal_force(e, matrices, rule, s, w, state):
     # In the mixed iteration with independent stresses S, the residual of ``S = D eps(u)`` acts in
     # the directions of the factors: ``f = B(u)^T S + B(origin)^T (D eps(u) - S)``, and likewise for
     # viscous stresses.
-    u0, u, f, S = w.y[0], w.x.u, w.x.force, w.stresses
+    conserving, u, f, S = rule.conserving > 0, w.x.u, w.x.force, w.stresses
+    u0 = w.y[0] if conserving else u
     missing, independent, constitutive, slow, rates = S[2], S[3], S[4], S[5], S[6]
     if state.mixed_steps[0] > 0:
-        body_mixed(e.body, rule.conserving > 0, u0, u, f, independent, constitutive)
+        body_mixed(e.body, conserving, u0, u, f, independent, constitutive)
         for i in indices(missing.size):
             missing[i] = constitutive[i] - independent[i]
         if matrices.dampers.viscous > 0:
             body_linearised(e.viscous, w.x.middle, w.x.damping_velocity, S[0], rates)
             add_force_of(e.body, w.x.middle, slow, f)
-            for i in indices(missing.size):
-                missing[i] += rates[i] - slow[i]
+            add_multiple(1.0, rates, missing)
+            add_multiple(-1.0, slow, missing)
         add_force_of(e.body, w.x.origin, missing, f)
-    elif rule.conserving > 0:
+    elif conserving:
         body_mean(e.body, u0, u, f)
     else:
         body_force(e.body, u, f)
-    if rule.conserving > 0:
-        add_elastic_force(e.forces, s.t_force, s.dt, u0, u, state.guess[0], f)
-    else:
-        add_elastic_force(e.forces, s.t_force, 0.0, u, u, state.guess[0], f)
+    add_elastic_force(e.forces, s.t_force, s.dt if conserving else 0.0, u0, u, state.guess[0], f)
     if matrices.dampers.active > 0:  # materials are included already in the mixed iteration
         d = w.x.damping
         damping_force(e, matrices.dampers, matrices.M, s.t_force, w.x.middle, w.x.damping_velocity,
                       state.mixed_steps[0], d, w.x.scratch)
-        for i in indices(f.size):
-            f[i] += d[i]
+        add_multiple(1.0, d, f)
 
 
 @apart("joints", *ALL)
@@ -122,7 +114,7 @@ def directions(e, matrices, rule, s, w, state):
         clear(flat)
         call_custom(JOINTS, e.joints.custom, np.int64(5), s.t_force, 1.0, w.x.u, w.y[0], flat)
     else:
-        joint_directions(e.joints, s.joints.g[1], s.t_force, w.x.middle, w.J[0])
+        joint_directions(e.joints, s.g, s.t_force, w.x.middle, w.J[0])
     joint_directions(e.joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
@@ -139,9 +131,8 @@ def residual(e, matrices, rule, s, w, state):
         R[i] = R[i] - f[i] - scratch[i]
     if rule.solver > 0:
         clear(scratch)
-        add_joint_force(e.joints, s.joints.g[1], s.t_force, w.x.middle, w.m.l, scratch)
-        for i in indices(u.size):
-            R[i] -= scratch[i]
+        add_joint_force(e.joints, s.g, s.t_force, w.x.middle, w.m.l, scratch)
+        add_multiple(-1.0, scratch, R)
     else:
         subtract_rows(w.J[0], w.m.l, R)
 
@@ -151,12 +142,7 @@ def add_impulses(e, matrices, rule, s, w, state):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
     v0, v, scratch, share, impulse = w.y[1], w.x.v, w.x.scratch, w.m.phi, w.m.impulse
     if e.joints.custom > 0:
-        n = v.size
-        ends = np.empty(3 * n + impulse.size)
-        copy(v0, ends[:n])
-        copy(v, ends[n:2 * n])
-        copy(w.y[0], ends[2 * n:3 * n])
-        copy(impulse, ends[3 * n:])
+        ends = np.concatenate((v0, v, w.y[0], impulse))
         call_custom(JOINTS, e.joints.custom, np.int64(6), s.t_force, 1.0, w.x.u, ends, w.x.residual)
         return
     for i in indices(v.size):
@@ -279,32 +265,8 @@ def _eliminated(joints, rule, s, w, at, b, x, state, exact):
     if not call_solver(rule.mass_solver, s.t, w.x.u, known, x, rate, change, b):
         state.failure[0] = DEPENDENT
         return FAILED
-    for i in indices(x.size):
-        x[i] += change[i]
+    add_multiple(1.0, change, x)
     return GO_ON
-
-
-@apart("motion", *ALL)
-def accelerations(e, matrices, rule, s, w, state):
-    """Set w_1 (in place of the correction), a_1 and the multipliers at the end of the step."""
-    u, v, base, rest, v0 = w.x.u, w.x.v, w.x.base, w.x.rest, w.y[1]
-    a1, w1, w0, given = w.x.acceleration, w.x.du, w.y[3], s.supports[2]
-    l, impulse, l0, last = w.m.l, w.m.impulse, w.m.l0, w.m.last
-    if rule.conserving > 0:
-        # values in the middle of steps, extrapolated to the end from the last two
-        ahead = s.dt / (s.dt + state.last_dt[0])
-        for i in indices(u.size):
-            w1[i] = (v[i] - v0[i]) / s.dt
-            a1[i] = (w1[i] + ahead * (w1[i] - w0[i])) * e.free[i] + given[i]
-        for k in indices(l.size):
-            l[k] += impulse[k] / s.dt
-            l0[k] = l[k] + ahead * (l[k] - last[k])
-            last[k] = l[k]
-    else:
-        c = 1.0 / (rule.beta * s.dt * s.dt)
-        for i in indices(u.size):
-            w1[i] = c * (u[i] - base[i])
-            a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * e.free[i] + given[i]
 
 
 @apart("joints", *ALL, returns=int)
@@ -317,8 +279,7 @@ def close_acceleration(e, matrices, rule, s, w, state):
     if rule.mass_solver > 0:
         if _eliminated(e.joints, rule, s, w, w.x.u, dl, a1, state, EXACTLY) == FAILED:
             return FAILED
-        for i in indices(w1.size):
-            w1[i] += share * w.x.damping_velocity[i]
+        add_multiple(share, w.x.damping_velocity, w1)
     else:
         if solve_joined(matrices.mass, w.J[1], w.J[1], e.free, anew, w.J[3], w.S, dl, a1) == 0:
             state.failure[0] = DEPENDENT
@@ -352,7 +313,7 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
     """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded."""
     # Written for each step: work of damping, 1 if something may touch and history, (n, 2 + k); u,
     # v, a and w, (n, 4, N); multipliers at the end and where they were evaluated, (n, 2, m).
-    contacts, taken, w0, w1 = e.forces.contacts, np.empty(1), w.y[3], w.x.du
+    contacts, w0, w1 = e.forces.contacts, w.y[3], w.x.du
     for n in range(rows.shape[0]):
         s = step_of(e.joints, rule, data, n)
         if contacts.lasting >= PRESSURES:  # the solution depends on the initial guess
@@ -366,9 +327,7 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
             add_work(e, matrices, rule, s, w, state)
         if e.lasting > 0:
             settle(e, (s.t_force, s.t), s.dt if rule.conserving > 0 else 0.0, w.y[0], w.x.u, w.x.v,
-                   taken)
-            state.dissipated[0] += taken[0]
-            copy(e.history, memories[n, 2:])
+                   state, memories[n, 2:])
         touches = contacts.number > 0 or e.forces.changing > 0
         memories[n, 1] = 1.0 if touches and may_pass(e.forces, w.y[0], w.x.u) else 0.0
         # the end of the step becomes the start of the next
@@ -438,18 +397,35 @@ def _iterate(e, matrices, rule, s, w, state):
     return FAILED
 
 
-@source
+@apart("motion", *ALL, returns=int)
 def _end(e, matrices, rule, s, w, state):
-    """Set velocities, accelerations and multipliers of the last iterate; may be FAILED."""
-    joined = w.m.l.size > 0
-    if joined and not s.constant:
-        directions(e, matrices, rule, s, w, state)
-    status = GO_ON
+    """Set velocities, accelerations and multipliers of the last iterate; may be FAILED. w_1 takes
+    the place of the correction."""
+    joined, status = w.m.l.size > 0, GO_ON
     if joined:
+        if not s.constant:
+            directions(e, matrices, rule, s, w, state)
         status = end_velocity(e, matrices, rule, s, w, state, EXACTLY)
     else:
         free_velocity(e.free, rule, s, w)
-    accelerations(e, matrices, rule, s, w, state)
+    u, v, base, rest, v0 = w.x.u, w.x.v, w.x.base, w.x.rest, w.y[1]
+    a1, w1, w0, given = w.x.acceleration, w.x.du, w.y[3], s.supports[2]
+    l, impulse, l0, last = w.m.l, w.m.impulse, w.m.l0, w.m.last
+    if rule.conserving > 0:
+        # values in the middle of steps, extrapolated to the end from the last two
+        ahead = s.dt / (s.dt + state.last_dt[0])
+        for i in indices(u.size):
+            w1[i] = (v[i] - v0[i]) / s.dt
+            a1[i] = (w1[i] + ahead * (w1[i] - w0[i])) * e.free[i] + given[i]
+        for k in indices(l.size):
+            l[k] += impulse[k] / s.dt
+            l0[k] = l[k] + ahead * (l[k] - last[k])
+            last[k] = l[k]
+    else:
+        c = 1.0 / (rule.beta * s.dt * s.dt)
+        for i in indices(u.size):
+            w1[i] = c * (u[i] - base[i])
+            a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * e.free[i] + given[i]
     if status == GO_ON and joined and rule.conserving == 0:
         status = close_acceleration(e, matrices, rule, s, w, state)
     return status
@@ -524,10 +500,8 @@ def _correct(e, matrices, rule, s, w, state, anew):
         if not good:
             state.failure[0] = DEPENDENT
             return FAILED
-        for k in indices(l.size):
-            l[k] += dl[k]
-    for i in indices(u.size):
-        u[i] += du[i]
+        add_multiple(1.0, dl, l)
+    add_multiple(1.0, du, u)
     state.last_correction[0], state.correction[0] = (
         state.correction[0], correction_size(e, R, du, phi, dl))
     return GO_ON

@@ -91,12 +91,12 @@ class TimeFunctions:
         if s.constraints.moves:
             supports[..., s.constraints.fixed] = moving(s.constraints.values_at)
         c, g = tables.still
-        c, g = c[:, None], g[:, None, 1:]
+        c, g = c[:, None], g[:, None]
         if tables.motion_varies and not tables.plain.joints.custom:
             found = moving(tables.driven)
-            c = found[..., :s.constraints.m]
+            c = np.ascontiguousarray(found[..., :s.constraints.m])
             if tables.turns:
-                g = found[..., s.constraints.m:]
+                g = np.ascontiguousarray(found[..., s.constraints.m:])
         factors = tables.factors(times.ravel())
         factors = factors.reshape(n, len(self._at), -1) if len(factors) > 1 else factors[None]
         return TimeValues(times, factors, supports, c, g)

@@ -9,8 +9,7 @@ from threading import RLock
 from typing import Any, NamedTuple
 
 from ..beam.kernels.tables import points_of
-from ..core import Array, announced_bar, cached_property, code_cache, deferred, raise_kept
-from ..core.code_cache import compiled_off, compiled_setting
+from ..core import announced_bar, cached_property, code_cache, deferred, raise_kept
 from .tables import Tables
 
 logger = logging.getLogger(__name__)
@@ -52,8 +51,6 @@ class Choice(NamedTuple):
     reason: str
 
 
-_IS_LOADED = Choice("loaded", "compiled code is loaded")
-
 
 class Backend:
     """Runs the kernels of a system. The process counts its work in NumPy: iterations times elements
@@ -85,10 +82,6 @@ class Backend:
         tables = self.tables.linearised
         return None if tables is None else self.with_tables(tables)
 
-    def elastic_from(self, u: Array) -> "Backend":
-        """The backend for :meth:`Tables.elastic_from`."""
-        return self.after(self.tables.elastic_from(u))
-
     def with_tables(self, tables: Tables) -> "Backend":
         """A copy for other tables."""
         backend = copy(self)
@@ -111,12 +104,12 @@ class Backend:
     def choose(self, name: str, iterations: float = 1.0) -> Choice:
         """The choice for the next call of a kernel, by its name and expected iterations."""
         missing = self._missing(name)
-        if not (missing or self._plain or PROBLEMS) and compiled_setting() != "0":
-            return _IS_LOADED
-        off = self._plain or (PROBLEMS[0] if PROBLEMS else compiled_off())
+        if not (missing or self._plain or PROBLEMS) and code_cache.compiled_setting() != "0":
+            return Choice("loaded", "compiled code is loaded")
+        off = self._plain or (PROBLEMS[0] if PROBLEMS else code_cache.compiled_off())
         if off is not None:
             return Choice("plain", off)
-        if compiled_setting() == "1":
+        if code_cache.compiled_setting() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
         if missing == [name] and SECONDS[name] <= SHORT:
             return Choice("compiled", "its parts are loaded")
@@ -146,15 +139,14 @@ class Backend:
 
     def seconds(self, iterations: float) -> float:
         """Approximate seconds of NumPy for a number of iterations."""
-        elements, points = self._size
-        return iterations * (ITERATION + ELEMENT * elements + POINT * points)
+        return iterations * self._iteration
 
     @cached_property
-    def _size(self):
-        """Number of elements, and of points of contact."""
+    def _iteration(self):
+        """Approximate seconds of an iteration in NumPy."""
         system = self.tables.system
-        return (sum(beam.mesh.nelements for beam in system.beams),
-                sum(len(group.first) for _, group in system.forces.contacts.groups))
+        return (ITERATION + ELEMENT * sum(beam.mesh.nelements for beam in system.beams)
+                + POINT * sum(len(group.first) for _, group in system.forces.contacts.groups))
 
     def of(self, kernel: Callable, iterations: float = 1.0, calls: bool = False) -> Callable:
         """A kernel bound to the equations, its first argument, in NumPy or compiled."""

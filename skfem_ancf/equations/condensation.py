@@ -5,7 +5,6 @@ those of the node plus the residual of the joint equations. Multipliers are ther
 they are the residual forces at the ends. Statics, modes and time integration use the same
 factors."""
 
-import logging
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -18,8 +17,6 @@ from ..beam import Beam
 from ..core.band import SMALL, BandMatrix, Inertia
 from ..core import Array
 from .rank import diagonal_factors
-
-logger = logging.getLogger(__name__)
 
 #: A pivot that small beside the diagonal is round-off.
 LOST = 1e-13
@@ -44,11 +41,6 @@ class Group(NamedTuple):
     first: Array  # first DOF of each, (M,)
     nd: int  # DOFs of a node
     elements: int  # elements of a member
-
-    @property
-    def ends(self) -> Array:
-        """Numbers of the first and last ends, shape (2, M)."""
-        return 2 * self.members + np.array([[0], [1]])
 
     @property
     def places(self) -> Array:
@@ -78,8 +70,14 @@ class Condensed:
         nodes: Nodes = system.constraints.frame
         self._K, self.at = K, (np.zeros(system.N), np.zeros(system.constraints.m))
         self.nodes, self.groups = nodes, groups_of(system.beams, system.slices)
-        self._bases = [[_Basis(nodes, group, ends) for ends in group.ends] for group in self.groups]
-        unknown = self._unknown()
+        # both ends of each member, numbered one after the other
+        self._bases = [[_Basis(nodes, group, 2 * group.members + end) for end in (0, 1)]
+                       for group in self.groups]
+        unknown = ~nodes.fixed  # x, y and the rotation of each node
+        unknown[np.setdiff1d(np.arange(len(unknown)), nodes.nodes)] = False  # no line ends there
+        rigid = np.zeros(len(unknown), dtype=bool)
+        rigid[nodes.nodes[~nodes.hinged]] = True
+        unknown[:, 2] &= rigid
         order = _order(nodes)
         number = np.empty(unknown.shape, dtype=np.int64)
         number[order] = np.cumsum(unknown[order]).reshape(-1, 3) - 1
@@ -108,15 +106,6 @@ class Condensed:
     def forget(self) -> None:
         self._parts, self._nodes = [], None
 
-    def _unknown(self):
-        """Whether x, y and the rotation of a node are unknowns, (number, 3)."""
-        out = ~self.nodes.fixed
-        out[np.setdiff1d(np.arange(len(out)), self.nodes.nodes)] = False  # no line ends there
-        rigid = np.zeros(len(out), dtype=bool)
-        rigid[self.nodes.nodes[~self.nodes.hinged]] = True
-        out[:, 2] &= rigid
-        return out
-
     # factors
 
     def factorize(self, u: Array, multipliers: Array) -> None:
@@ -126,33 +115,24 @@ class Condensed:
         turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
         follow = self.nodes.turned  # ends that follow a rotation, and scales of their equations
         scales = (np.conj(turns[follow]) * turns[self.nodes.leader[follow]]).real
-        moments = self._moments(multipliers, scales)
+        # coupling of rotation and stretch of each end by the multipliers of the rotations
+        moments, values = np.zeros(len(self.nodes.nodes)), self.nodes.split(multipliers)[1] * scales
+        np.add.at(moments, self.nodes.leader[follow], -values)
+        moments[follow] += values
         S, self._parts, self._nodes = np.empty((len(hinged), 6, 6)), [], None  # no two at once
         for group, bases in zip(self.groups, self._bases):
             self._parts.append(_Part(group, K, bases, turns, moments, hinged[group.members], S))
         #: end displacements from the residual of the joints; the transpose gives multipliers
         self._moved = self._moves(turns, scales)
         self._pushed = self._moved.T
-        self._ends, self._nodes = S, self._factors(S)
-
-    def _moments(self, multipliers, scales):
-        """Coupling of rotation and stretch of each end by the multipliers of the rotations."""
-        out, follower = np.zeros(len(self.nodes.nodes)), self.nodes.turned
-        value = self.nodes.split(multipliers)[1] * scales
-        np.add.at(out, self.nodes.leader[follower], -value)
-        out[follower] += value
-        return out
-
-    def _factors(self, ends):
-        """The diagonal of the matrix of the nodes, and its sparse factors."""
-        n = self.size
-        if not n:
-            return np.zeros(0), None
-        A = sparse.coo_array((ends.ravel()[self._inside], self._entries), (n, n)).tocsc()
-        lu = diagonal_factors(A, "NATURAL")
-        if lu is None:
-            raise np.linalg.LinAlgError("a pivot of the nodes is zero")
-        return A.diagonal(), lu
+        self._ends, n, diagonal, lu = S, self.size, np.zeros(0), None
+        if n:
+            A = sparse.coo_array((S.ravel()[self._inside], self._entries), (n, n)).tocsc()
+            diagonal, lu = A.diagonal(), diagonal_factors(A, "NATURAL")
+            if lu is None:
+                raise np.linalg.LinAlgError("a pivot of the nodes is zero")
+        #: the diagonal of the matrix of the nodes, and its sparse factors
+        self._nodes = diagonal, lu
 
     def inertia(self) -> Inertia:
         """Inertia of the tangent on the null space of J."""
@@ -412,7 +392,7 @@ class _Part:
                 if np.min(pivots) > SMALL:
                     continue
             except np.linalg.LinAlgError:
-                logger.debug("members buckle between their ends")
+                pass  # members buckle between their ends
             values = np.linalg.eigvalsh(A)
             negative += int(np.sum(values < 0.0))
             singular = singular or bool(np.any(np.abs(values) < LOST))

@@ -6,6 +6,7 @@ from copy import copy
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 from scipy import sparse
 
 from ..actions.bound import BoundConstraint, everywhere, is_table
@@ -13,14 +14,13 @@ from ..actions.joints.base import IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam import Beam, RigidBody
 from ..core.band import dense
-from ..core import Array, InputError, ModelWarning, SupportError, cached_property, is_builtin, shown
+from ..core import (Array, InputError, ModelWarning, SupportError, cached_property, is_builtin,
+                    refuse, shown)
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
-from .rank import DENSE, FREE, first_dependent
+from .rank import DENSE, DEPENDENT, FREE, groups
 
 #: Largest number of multipliers with dense Jacobians.
 FEW = 96
-#: Largest relative residual of redundant equations.
-OPENED = 1e-5
 #: Cached properties that change when redundant equations are removed.
 CACHED = "slopes", "seconds", "tabled", "_still", "_at_rest", "frame", "_limited"
 #: Empty rows, columns and values.
@@ -56,15 +56,16 @@ class Constraints:
         self._fixing: list[Any] = []
         zero, fixed, held, first = np.zeros(self.N), [self.fixed], [self._held], len(self.fixed)
         for joint in joints:
-            found = _fixes(joint, zero) if joint.constant else None
-            if found is None:
+            rows, dofs, factors = joint.entries(zero, 0.0) if joint.constant else _NO_ENTRIES
+            order = rows.argsort()
+            fixes = (joint.constant and rows[order].tolist() == list(range(len(joint.equations)))
+                     and factors.all())  # one DOF in each equation
+            dofs, factors = dofs[order], factors[order]
+            held_already = not self.free.take(dofs).all()
+            if not fixes or held_already and not joint.moving:
                 self.joints.append(joint)
                 continue
-            dofs, factors = found
-            if not self.free.take(dofs).all():
-                if not joint.moving:
-                    self.joints.append(joint)
-                    continue
+            if held_already:
                 clash = np.sort(dofs[~self.free[dofs]])
                 raise SupportError(
                     f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
@@ -85,7 +86,11 @@ class Constraints:
         """Remove redundant equations of joints, with a warning."""
         if not self.joints or self.condensable:
             return
-        self._independent = self._apart or self._dependent() is None
+        rows, columns, values = self.slopes
+        # each DOF of the joints is free and occurs in one equation only
+        apart = (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
+                 and bool(self.free.take(columns).all()) and bool(values.all()))
+        self._independent = apart or self._dependent() is None
         if self._independent:
             return
         found, self.passing = repeated(self)
@@ -296,7 +301,8 @@ class Constraints:
                 joint.mean_entries(v, u, t) for joint in self.joints)).ravel()
         elif what == 6:
             v0, v1, u0 = v[:3 * N].reshape(3, N)
-            out += self.mean_turning(u0, u, v0, v1, t, v[3 * N:])
+            for joint, impulse in zip(self.joints, self.multipliers_of(v[3 * N:])):
+                out += joint.mean_turning(u0, u, v0, v1, t, impulse)
         for joint in self.joints if what in (4, 7, 8) else ():
             part = out[first:first + len(joint.equations)]
             first += len(part)
@@ -325,13 +331,6 @@ class Constraints:
             i, j, v = _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
         return i, j, v * (self.free[i] & self.free[j])
 
-    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
-                     multipliers: Array) -> Array:
-        """The correction of conserving steps for joints that are not quadratic, shape (N,)."""
-        parts = zip(self.joints, self.multipliers_of(multipliers))
-        return sum((joint.mean_turning(u0, u1, v0, v1, t, part) for joint, part in parts),
-                   np.zeros(self.N))
-
     @cached_property
     def _limited(self) -> list[BoundConstraint]:
         """Joints with a limited range."""
@@ -340,7 +339,8 @@ class Constraints:
     def lost(self, u: Array) -> str:
         """Why a joint cannot act in a converged state, or ""."""
         for joint, out, size in self._unasked:
-            if (np.abs(joint.value(u, 0.0)[out]) > OPENED * size).any():
+            # redundant equations are opened
+            if (np.abs(joint.value(u, 0.0)[out]) > 1e-5 * size).any():
                 return f"{joint!r} contradicts the other joints in this position"
         return next(filter(None, (joint.lost(u) for joint in self._limited)), "")
 
@@ -431,10 +431,24 @@ class Constraints:
                 f"{value:g} if the motion starts from the displaced static state")
 
     def _dependent(self):
-        """The first dependent equation, see :func:`.rank.first_dependent`."""
-        zero = np.zeros(self.N)
-        return first_dependent(self._at_rest * self.coordinate_sizes, self.free,
-                               lambda: self.constraint(zero, 0.0))
+        """The first equation that depends on those before it at free DOFs, or None; with its
+        residual when those before it are met."""
+        # Rows are orthogonalised by QR in order, in groups without a common column.
+        J, first = self._at_rest * self.coordinate_sizes, None
+        size = np.sqrt((J * J).sum(axis=1))
+        for rows, _, A in groups(J * self.free):
+            if first is not None and rows[0] > first[0]:
+                continue
+            R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # in the upper triangle
+            rest, k = np.zeros(len(rows)), min(R.shape)
+            rest[:k] = np.abs(R.diagonal())
+            small = rest <= DEPENDENT * size[rows]
+            k = int(small.argmax())
+            if small[k] and (first is None or rows[k] < first[0]):
+                gap = self.constraint(np.zeros(self.N), 0.0)[rows]
+                known = scipy.linalg.solve_triangular(R[:k, :k], gap[:k], trans="T")
+                first = int(rows[k]), float(gap[k] - R[:k, k] @ known)
+        return first
 
     def require_independent_joints(self) -> None:
         """Raise SupportError if equations of joints and supports are dependent."""
@@ -456,13 +470,6 @@ class Constraints:
                            "joints before it prescribe already: remove one of them")
 
     @property
-    def _apart(self):
-        """True if each DOF of the joints is free and occurs in one equation only."""
-        rows, columns, values = self.slopes
-        return (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
-                and bool(self.free.take(columns).all()) and bool(values.all()))
-
-    @property
     def few(self) -> bool:
         """True if Jacobians are dense matrices."""
         return self.frame is None and self.m <= FEW
@@ -479,13 +486,12 @@ class Constraints:
 
     def free_rigid_motions(self) -> list[str]:
         """Descriptions of unconstrained rigid motions."""
-        return free_rigid_motions(self, self._at_rest, self._stiffness)
+        return free_rigid_motions(self)
 
     def require_supports(self) -> None:
         """Raise SupportError if a rigid motion is unconstrained, or joints are dependent."""
         self.require_independent_joints()
-        if self.missing_supports:
-            raise SupportError(self.missing_supports)
+        refuse(self.missing_supports, self.missing_supports, error=SupportError)
 
     @cached_property
     def missing_supports(self) -> str:
@@ -513,11 +519,3 @@ class Constraints:
 def _joined(parts):
     """Concatenate rows, columns and values of several tables."""
     return parts[0] if len(parts) == 1 else tuple(map(np.concatenate, zip(*parts)))
-
-
-def _fixes(joint, zero):
-    """DOFs that a joint fixes, and their factors; None if it does more than that."""
-    rows, dofs, factors = joint.entries(zero, 0.0)
-    order = rows.argsort()
-    each = rows[order].tolist() == list(range(len(joint.equations)))
-    return (dofs[order], factors[order]) if each and factors.all() else None

@@ -122,8 +122,6 @@ def balance(e, target, factors, which, mixed, g, x, m, stresses, norms):
 #: What an iteration has seen to be within the range of the model: nothing, the axes of all beams
 #: (none turns by more than a radian over an element, or folds), or their strains too.
 UNSEEN, AXES, RANGE = range(3)
-#: Tangent of that angle.
-RADIAN = 1.557
 
 
 @source
@@ -137,7 +135,7 @@ def examine(e, u, stresses):
         c, d = rest[2, k] + u[j + 2], rest[3, k] + u[j + 3]
         x, y = rest[4, k] + (u[j] - u[i]), rest[5, k] + (u[j + 1] - u[i + 1])
         p, q = a * c + b * d, a * d - b * c
-        turn = np.abs(q * rest[6, k] + p * rest[7, k]) - RADIAN * (
+        turn = np.abs(q * rest[6, k] + p * rest[7, k]) - 1.557 * (  # tangent of a radian
             p * rest[6, k] - q * rest[7, k])
         beyond[k] = np.maximum(0.0, np.maximum(turn, -np.minimum(a * x + b * y, c * x + d * y)))
     if largest(beyond) != 0.0:

@@ -173,9 +173,10 @@ class Histories:
             if len(given) == new.stop - (new.start or 0) and _laws(beam) == _laws(other):
                 now.values[new], known = given, known or len(given) > 0
             elif np.any(given):
+                names = ", ".join(str(layer.material) for layer in other.across.layers)
                 raise InputError(
                     f"{beam!r} cannot take over the history of the state, which is that of "
-                    f"{_names(other)}: without it, what is bent would spring back. Keep the kinds "
+                    f"{names}: without it, what is bent would spring back. Keep the kinds "
                     "of materials, and their points=; or begin with its displacements alone, "
                     "start=scene.state(state.u)")
         return now.values if known else None
@@ -188,7 +189,3 @@ def _differ(a, b):
 def _laws(beam):
     """Kinds of the materials of a beam."""
     return [type(layer.material) for layer in beam.across.layers]
-
-
-def _names(beam):
-    return ", ".join(str(layer.material) for layer in beam.across.layers)

@@ -24,8 +24,6 @@ logger = logging.getLogger(__name__)
 
 #: Smallest relative pivot of a definite matrix.
 SURE = 1e-10
-#: Largest number of DOFs for the inertia of a dense matrix.
-SMALL_ENOUGH = 100
 #: Largest relative residual of factors without pivoting.
 ROUGH = 1e-8
 
@@ -304,12 +302,7 @@ class NullSpace:
             at = np.take_along_axis(block.columns, pivots, axis=1)
             given[at] = True
             self._groups.append((block, at, R, M))
-        self._T = self._basis(given)
-        self._reduced = (self._T.T @ self._K @ self._T).tocsc() if m else self._K
-        self._lu, self._plain = self._factors(K.symmetric)
-
-    def _basis(self, given):
-        """A basis (n, n - m) of the null space of J."""
+        # a basis (n, n - m) of the null space of J
         free = np.flatnonzero(~given)
         number = np.cumsum(~given) - 1
         parts = [(free, number[free], np.ones(len(free)))]
@@ -317,12 +310,11 @@ class NullSpace:
             g, a, b = np.nonzero(R * ~given[block.columns][:, None])
             parts.append((at[g, a], number[block.columns[g, b]], -R[g, a, b]))
         i, j, v = map(np.concatenate, zip(*parts))
-        return sparse.csc_array((v, (i, j)), shape=(len(given), len(free)))
-
-    def _factors(self, symmetric):
-        """LU factors, and whether all pivots are on the diagonal."""
-        lu = diagonal_factors(self._reduced, "MMD_AT_PLUS_A") if symmetric else None
-        return (splu(self._reduced), False) if lu is None else (lu, True)
+        self._T = sparse.csc_array((v, (i, j)), shape=(n, len(free)))
+        self._reduced = (self._T.T @ self._K @ self._T).tocsc() if m else self._K
+        lu = diagonal_factors(self._reduced, "MMD_AT_PLUS_A") if K.symmetric else None
+        self._plain = lu is not None  # all pivots are on the diagonal
+        self._lu = splu(self._reduced) if lu is None else lu
 
     def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
         x, b, T = np.zeros(self._shape[1]), self._sizes * b, self._T
@@ -347,7 +339,7 @@ class NullSpace:
 
     def reduced(self) -> Any:
         """K on the null space of J, dense if small."""
-        return self._reduced.toarray() if self._shape[1] <= SMALL_ENOUGH else self._reduced
+        return self._reduced.toarray() if self._shape[1] <= 100 else self._reduced
 
     def inertia(self) -> Inertia:
         """Inertia of the symmetric part of K on the null space of J."""
@@ -395,10 +387,9 @@ class MassSolver:
     def _condensed(self):
         return CondensedMass(self._system)
 
-    def __call__(self, u: Array, t: float, J: Any = None
-                 ) -> Callable[[Array, Array], tuple[Array, Array]]:
+    def __call__(self, u: Array, t: float, J: Any) -> Callable[[Array, Array], tuple[Array, Array]]:
         """A function of b (N,) and rate (m,) that returns x and l, at one displacement and time."""
-        # J is ``constraints.full_jacobian(u, t)`` if known.
+        # J is ``constraints.full_jacobian(u, t)`` if there are joints.
         if self.by_nodes:
             mass = self._condensed
             mass.forget()
@@ -408,11 +399,10 @@ class MassSolver:
                 return mass.solve(u, t, b, rate)
 
             return solve_by_nodes
-        M, constraints = self.factors, self._system.constraints
-        free = constraints.free
-        if not constraints.m:
+        M, free = self.factors, self._system.constraints.free
+        if not self._system.constraints.m:
             return lambda b, rate: (M.solve(b * free), np.zeros(0))
-        J = dense(constraints.full_jacobian(u, t) if J is None else J) * free
+        J = dense(J) * free
         Y = M.solve(J.T)
         S = J @ Y
 

@@ -8,9 +8,7 @@ from copy import copy
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-import scipy.linalg
 from scipy import sparse
-from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
 from ..actions.forces.kernels import add_elastic_force
@@ -163,8 +161,13 @@ class StrainTangent:
                  multipliers: Array) -> None:
         self.system, self.free = system, np.nonzero(system.constraints.free)[0]
         self._at = u, load, t, load if t is None else t
-        parts = [_beam_rows(beam, system.histories.kernel(beam), u[s])
-                 for beam, s in zip(system.beams, system.slices)]
+        parts: list[Any] = []  # B and C B of each beam, sparse, and its weighted stresses
+        for beam, s in zip(system.beams, system.slices):
+            B, CB, stress = system.histories.kernel(beam).gradients(u[s])
+            j = np.broadcast_to(element_dofs(beam)[:, None], B.shape).ravel()
+            first = B.shape[2] * np.arange(stress.size + 1)
+            parts.append((*(sparse.csr_matrix((x.ravel(), j, first), shape=(stress.size, beam.N))
+                            for x in (B, CB)), stress.ravel()))
         rigid = system.N - sum(beam.N for beam in system.beams)
         if rigid:  # DOFs without strain
             parts.append((*2 * [sparse.csr_matrix((0, rigid))], np.zeros(0)))
@@ -183,7 +186,7 @@ class StrainTangent:
 
     def _set_stress(self, stress, multipliers):
         self.stress, self.multipliers = stress, multipliers
-        K = csr_matrix(self.system.element_stiffness(self._at[0], self._at[3]))
+        K = sparse.csr_matrix(self.system.element_stiffness(self._at[0], self._at[3]))
         self.S = self.geometric(stress, multipliers, self._at[1]) + K[self.free][:, self.free]
 
     def _element_force(self):
@@ -192,7 +195,7 @@ class StrainTangent:
         add_elastic_force(system.backend.tables.plain.forces, self._at[3], 0.0, u, u, 0, force)
         return force[self.free]
 
-    def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:
+    def geometric(self, stress: Array, multipliers: Array, load: float) -> sparse.csr_matrix:
         """The part S (n, n) for stresses (k,), multipliers (m,) and a load factor."""
         u, _, t, time = self._at
         S = []
@@ -208,26 +211,22 @@ class StrainTangent:
              + self.system.constraints.curvature(u, time, multipliers))
         return S[self.free][:, self.free]
 
-    def response(self) -> tuple[Array, Array, Array]:
-        """Linear response to the full load: du (N,), stress (k,), multipliers (m,)."""
-        system, u = self.system, self._at[0]
-        du = np.zeros(system.N)
-        du[system.constraints.fixed] = system.constraints.values(1.0)
-        rest = (system.external_force(u)[self.free] - self._element_force()
-                - self.B.T @ (self._rows[1] @ du))
-        gap = -system.constraints.constraint(u + du, 1.0)
-        return self._responding(rest, du, gap[:, None])
-
-    def added(self, force: Array) -> tuple[Array, Array, Array]:
-        """As :meth:`response`, to a force (N,) on top of the state."""
-        return self._responding(force[self.free], np.zeros(self.system.N))
-
-    def _responding(self, rest, du, gap=None):
+    def response(self, force: Array | None = None) -> tuple[Array, Array, Array]:
+        """Linear response to the full load: du (N,), stress (k,), multipliers (m,); or to a force
+        (N,) on top of the state."""
+        system, u, du, gap = self.system, self._at[0], np.zeros(self.system.N), None
+        if force is None:
+            du[system.constraints.fixed] = system.constraints.values(1.0)
+            rest = (system.external_force(u)[self.free] - self._element_force()
+                    - self.B.T @ (self._rows[1] @ du))
+            gap = -system.constraints.constraint(u + du, 1.0)[:, None]
+        else:
+            rest = force[self.free]
         x, multipliers = Inverse(self).solve_both(rest[:, None], gap)
         du[self.free] = x[:, 0]
         return du, self.stresses(du), multipliers[:, 0]
 
-    def balance(self, M: csr_matrix, shift: float) -> None:
+    def balance(self, M: sparse.csr_matrix, shift: float) -> None:
         """Replace the stress by one in equilibrium, if the state is an equilibrium to round-off."""
         # The axial stress of a slender beam has the round-off of the strain times E. The correction
         # of the displacement is negligible, that of the stress is not. ``K + shift M`` must be
@@ -259,7 +258,7 @@ class StrainTangent:
         """True if the tangent is symmetric to round-off."""
         return is_symmetric(self.S, self.system.constraints.coordinate_sizes[self.free])
 
-    def multiply(self, x: Array, S: csr_matrix | None = None) -> Array:
+    def multiply(self, x: Array, S: sparse.csr_matrix | None = None) -> Array:
         """The tangent times x, (n,) or (n, k); with another S if given."""
         return self.B.T @ (self.CB @ x) + (self.S if S is None else S) @ x
 
@@ -267,14 +266,6 @@ class StrainTangent:
     def size(self) -> tuple[int, int]:
         """Numbers of free DOFs and of joint equations."""
         return self.J.shape[1], self.J.shape[0]
-
-    def require_independent(self) -> None:
-        """Raise SupportError if the joint equations are dependent."""
-        if not self.J.shape[0]:
-            return
-        R = scipy.linalg.qr(self.J.toarray().T, mode="r")[0]
-        if np.min(np.abs(np.diag(R))) < 1e-12 * np.max(np.abs(R)):
-            raise SupportError("the joints are dependent in this state")
 
     def stresses(self, du: Array) -> Array:
         """Stresses (k,) of a displacement du (N,) to first order."""
@@ -298,18 +289,8 @@ def _joined(parts):
     return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
 
 
-def _beam_rows(beam, kernel, u):
-    """B and C B of a beam, sparse, and its weighted stresses."""
-    B, CB, stress = kernel.gradients(u)
-    n, stress = B.shape[2], stress.ravel()
-    j = np.broadcast_to(element_dofs(beam)[:, None], B.shape).ravel()
-    first = n * np.arange(len(stress) + 1)
-    return (*(sparse.csr_matrix((x.ravel(), j, first), shape=(len(stress), beam.N))
-              for x in (B, CB)), stress)
-
-
 def load_stiffness(system: Any, u: Array, load: float, t: float | None = None,
-                   first_order: bool = False) -> csr_matrix:
+                   first_order: bool = False) -> sparse.csr_matrix:
     """Minus the derivative (N, N) of the loads at u (N,), or of those of first order alone."""
     K = sparse.csr_matrix((system.N, system.N))
     for item in system.loads:

@@ -1,6 +1,5 @@
 """Unconstrained rigid motions, redundant joints, and their description."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,6 @@ from .rank import DENSE, DEPENDENT, groups, null_space, row_sizes, unit_rows
 
 # redundant equations of joints
 
-#: Relative size of a remainder, compared with the largest, from which a row may be the next pivot.
-MUCH = 0.5
 #: Relative size of the trial motion.
 MOVED = 3e-3
 #: Largest relative residual of closed equations.
@@ -51,13 +48,15 @@ def repeated(constraints: Any) -> tuple[Array | None, bool]:
         rest = np.setdiff1d(np.arange(len(rows)), kept)
         if not len(rest):
             continue
-        u = _beside(c, start, move, rows, len(kept))
-        if u is None and _closed(c, start, rows, len(kept)) is None:
+        closed = _closed(c, start, rows, len(kept))
+        if closed is None:
             return None, False
-        if u is None:
+        u, V = closed
+        beside = _closed(c, u + c.coordinate_sizes * (move - V.T @ (V @ move)), rows, len(kept))
+        if beside is None:
             passing = True
             continue
-        for J1 in (J, _scaled(c, u)):
+        for J1 in (J, _scaled(c, beside[0])):
             A = J1[rows].toarray() / size[:, None]
             C = np.linalg.lstsq(A[kept][:, c.free].T, A[rest][:, c.free].T, rcond=None)[0].T
             gap = A[rest] - C @ A[kept]
@@ -104,22 +103,12 @@ def _basis(A):
         left[kept] = 0.0
         if not left.max() > DEPENDENT:
             break
-        k = int((left >= MUCH * left.max()).argmax())
+        k = int((left >= 0.5 * left.max()).argmax())  # the first that is large enough
         q = A[k] / left[k]
         kept.append(k)
         for _ in range(2):  # reorthogonalise
             A -= np.outer(A @ q, q)
     return np.sort(np.array(kept, dtype=int))
-
-
-def _beside(c, start, move, rows, rank):
-    """A position near the start in which equations of this rank are closed, or None."""
-    found = _closed(c, start, rows, rank)
-    if found is None:
-        return None
-    u, V = found
-    found = _closed(c, u + c.coordinate_sizes * (move - V.T @ (V @ move)), rows, rank)
-    return None if found is None else found[0]
 
 
 def _closed(c, u, rows, rank):
@@ -150,14 +139,18 @@ def who(members: Any, k: int) -> str:
     return "" if len(members) == 1 else f" of beam {member.name or k}"
 
 
-def free_rigid_motions(constraints: Any, joints: Any,
-                       stiffness: Callable[[], Any] | None) -> list[str]:
+def free_rigid_motions(constraints: Any) -> list[str]:
     """Descriptions of the rigid motions that no support, joint or force element constrains."""
-    # ``joints`` is the Jacobian (m, N) in the reference configuration; ``stiffness`` returns the
-    # sparse stiffness of force elements there, or is None.
-    c = constraints
-    if len(c.members) == 1 and _held(c):
-        return []
+    c, joints, stiffness = constraints, constraints._at_rest, constraints._stiffness
+    if len(c.members) == 1:
+        # a node of the only member is held, and something that turns about it
+        (member,), held, sizes = c.members, set(c.fixed.tolist()), c.coordinate_sizes
+        node = next((d for d in held if d % member.nd == 0 and d + 1 in held), None)
+        q = member.q0_local
+        if node is not None and any(
+                abs(q[d ^ 1] - (q[node + (d ^ 1) % 2] if d % member.nd < 2 else 0.0))
+                > HELD * sizes[d] for d in held):
+            return []
     motions, of_joints, bodies = _motions(c, joints)
     parts = [motions[c.fixed], of_joints]
     if stiffness is not None:
@@ -169,18 +162,6 @@ def free_rigid_motions(constraints: Any, joints: Any,
     free = null_space(unit_rows(np.concatenate(parts) if dense else sparse.vstack(parts)))
     bodies = bodies() if len(free) else []
     return [_describe(v, bodies) for v in free]
-
-
-def _held(c):
-    """True if supports hold a node of the only member, and something that turns about it."""
-    (member,), held, sizes = c.members, set(c.fixed.tolist()), c.coordinate_sizes
-    node = next((d for d in held if d % member.nd == 0 and d + 1 in held), None)
-    if node is None:
-        return False
-    q = member.q0_local
-    levers = ((q[d ^ 1] - (q[node + (d ^ 1) % 2] if d % member.nd < 2 else 0.0), sizes[d])
-              for d in held)
-    return any(abs(lever) > HELD * size for lever, size in levers)
 
 
 def _motions(c, joints):

@@ -1,7 +1,6 @@
 """Rank, null spaces and inertia of sparse matrices."""
 
-import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +11,6 @@ from scipy.sparse.linalg import splu
 
 from ..core.band import SMALL, Inertia, beside_zero, dense
 from ..core import Array
-
-logger = logging.getLogger(__name__)
 
 #: Relative remainder of a dependent row.
 DEPENDENT = 1e-9
@@ -33,28 +30,6 @@ def is_symmetric(S: Any, sizes: Array, tol: float = 1e-12) -> bool:
     S = D @ S @ D
     gap = abs(S - S.T)
     return not gap.nnz or bool(gap.max() <= tol * abs(S).max())
-
-
-def first_dependent(J: Array | sparse.csr_array, free: Array,
-                    phi: Callable[[], Array]) -> tuple[int, float] | None:
-    """The first row of J (m, N) that depends on those before it at free DOFs, or None; with its
-    residual of ``phi()`` (m,) when those before it are met. Rows are orthogonalised by QR in order,
-    in groups without a common column."""
-    size = np.sqrt((J * J).sum(axis=1))
-    first = None
-    for rows, _, A in groups(J * free):
-        if first is not None and rows[0] > first[0]:
-            continue
-        R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # in the upper triangle
-        rest, k = np.zeros(len(rows)), min(R.shape)
-        rest[:k] = np.abs(R.diagonal())
-        small = rest <= DEPENDENT * size[rows]
-        k = int(small.argmax())
-        if small[k] and (first is None or rows[k] < first[0]):
-            gap = phi()[rows]
-            known = scipy.linalg.solve_triangular(R[:k, :k], gap[:k], trans="T")
-            first = int(rows[k]), float(gap[k] - R[:k, k] @ known)
-    return first
 
 
 def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
@@ -128,7 +103,7 @@ def inertia_of(A: Array | sparse.csr_array) -> Inertia:
         if positive and np.all(_pivots(A) > SMALL):
             return Inertia(0, False)
     except np.linalg.LinAlgError:
-        logger.debug("not definite")
+        pass  # not definite
     return beside_zero(lambda shift: int(np.sum(_pivots(A + shift * one) < 0.0)))
 
 

@@ -1,6 +1,5 @@
 """Stability of an equilibrium."""
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -13,10 +12,6 @@ from ..core.band import Inertia, fix
 from ..core import NO_FACTORS, Array
 from .rank import is_symmetric
 
-logger = logging.getLogger(__name__)
-
-#: Smallest stiffness of unconstrained motions, relative to that of the loads.
-STABILISING = 1e-5
 #: Largest number of position DOFs for dense eigenvalues.
 DENSE = 64
 #: Largest relative difference of nodal displacements in a rigid translation.
@@ -151,17 +146,6 @@ def has_potential(system: Any, u: Array, load: float) -> bool:
     return _is_symmetric(system)
 
 
-def not_unstable(system: Any, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
-    """True unless the equilibrium that an iteration just found is unstable."""
-    # The last factors usually decide; otherwise the tangent is factorised at the solution.
-    try:
-        if system.solver.stays():
-            return True
-    except NO_FACTORS:
-        logger.debug("the last factors do not decide")
-    return verdict(system, u, load, multipliers, t).stability != "unstable"
-
-
 def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
     """True if loads or obstacles stabilise a scene with unconstrained rigid motions."""
     # The tangent at u (N,) must be positive definite beyond round-off.
@@ -174,7 +158,8 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
     weights = position_weights(system) * system.constraints.mask
     acting = np.max(loads * weights)
     nodes = min(np.sum(weights[s]) for s in system.slices)  # of the smallest part that may be loose
-    least = STABILISING * acting / (system.size * max(1.0, nodes))
+    # of rigid motions, relative to the stiffness of the loads
+    least = 1e-5 * acting / (system.size * max(1.0, nodes))
     system.K.add_diagonal(-least * weights)
     try:
         system.solver.factorize(u, 1.0, multipliers)
@@ -230,11 +215,6 @@ def weak_at_rest(system: Any) -> str:
             f"formulation {', '.join(map(repr, names))} is not positive for this order of the "
             "element and this Poisson ratio. Use formulation 'assumed' (the default) or "
             "'continuum', a smaller nu or a smaller order")
-
-
-def potential(system: Any, u: Array, load: float, turned: Array | None = None) -> float:
-    """Total potential at u (N,): strain energy minus the work of the loads."""
-    return system.strain_energy(u, load) + load * system.load_potential(u, turned=turned)
 
 
 def largest_displacement(system: Any, du: Array) -> float:

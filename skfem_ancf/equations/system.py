@@ -270,7 +270,9 @@ class System:
         return MassSolver(self)
 
     @shared
-    def _free(self):
+    def without_contact(self) -> "System | None":
+        """The equations without contact of members, after the same histories; None if there is
+        none."""
         given, elements = list(self._given), self._given[6]
         given[6] = [e for e in elements if not hasattr(e, "broad_search")]
         if len(given[6]) == len(elements):
@@ -279,13 +281,6 @@ class System:
         other.histories = self.histories.of(other.forces)
         other.forces = other.histories.forces
         return other
-
-    @property
-    def without_contact(self) -> "System | None":
-        """The equations without contact of members, after the same histories; None if there is
-        none."""
-        free = self._free
-        return free if free is None or self.clock is None else free.at(self.clock)
 
     @shared
     def starts_untouched(self) -> bool:
@@ -351,16 +346,12 @@ class System:
         self._carry(None, load)
         return self.histories.accept(u0, u, t)
 
-    def _factors(self, t, load):
-        """Load factors (k,) at a time, or in statics."""
-        t, tables = self.clock if t is None else t, self.backend.tables
-        return tables.static_factors(load) if t is None else load * tables.factors(
-            np.array([t]))[0]
-
     def _carry(self, t, load):
         """Let materials with a history have the eigenstrains of the loads."""
         if self.histories.lasting >= MATERIALS:
-            carry_eigenstrains(self.backend.tables.plain.loads, self._factors(t, load))
+            t, tables = self.clock if t is None else t, self.backend.tables
+            carry_eigenstrains(tables.plain.loads, tables.static_factors(load) if t is None else
+                               load * tables.factors(np.array([t]))[0])
 
     def strain_energy(self, u: Array, t: float = 1.0) -> float:
         """Strain energy of beams and potential of force elements."""

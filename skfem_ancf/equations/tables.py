@@ -113,14 +113,25 @@ class Tables:
             self._loads[kind].append(load)
         self.motion_varies = any(joint.moving for joint in system.constraints.joints)
         self.turns = any(joint.turning for joint in system.constraints.joints)
-        joints, histories = self._joints(), system.histories
+        histories, constraints, joints = system.histories, system.constraints, _NO_JOINTS
+        #: g at the time 0
+        self._slope = np.zeros((1, 0))
+        if constraints.joints:
+            k, i, j, v = constraints.seconds
+            gk, gi, g = constraints.slopes
+            k, i, j, gk, gi = (packed(x, np.int64) for x in (k, i, j, gk, gi))
+            self._slope = packed(g)[None]
+            joints = JointTables(k, i, j, packed(v), gk, gi, constraints.equation_sizes(gk, gi, g),
+                                 0 if constraints.tabled else self.handle)
         body = body_of(system.beams, system.slices, joined=not system.viscous)
         if histories.path_dependent:
             body = body.after(histories.of_beams)
+        forces = system.forces.tables(system.K.position, system.symmetric, self.handle if (
+            system.forces.custom or system.forces.changing) else 0)
         self.plain = Equations(body, self._load_tables(), joints,
-                               system.constraints.fixed, system.constraints.mask, system.K,
+                               constraints.fixed, constraints.mask, system.K,
                                viscous_body_of(body, system.beams, system.retardation),
-                               self._forces(), body, system.constraints.coordinate_sizes,
+                               forces, body, constraints.coordinate_sizes,
                                histories.values, histories.span, histories.lasting,
                                _NO_FACTORS, self._axes(body))
 
@@ -217,11 +228,6 @@ class Tables:
                 limits.append(size.take(t.at[:, OF_H], 0).ravel())
         return Axes(np.concatenate(nodes, axis=1), np.concatenate(rest, axis=1),
                     np.concatenate([np.zeros(0), *limits]))
-
-    def _forces(self):
-        s = self.system
-        return s.forces.tables(s.K.position, s.symmetric,
-                               self.handle if s.forces.custom or s.forces.changing else 0)
 
     @property
     def calls_back(self) -> bool:
@@ -357,28 +363,11 @@ class Tables:
 
     # joints
 
-    def _joints(self):
-        s = self.system
-        #: g at the time 0
-        self._slope = np.zeros((1, 0))
-        if not s.constraints.joints:
-            return _NO_JOINTS
-        k, i, j, v = s.constraints.seconds
-        gk, gi, g = s.constraints.slopes
-        k, i, j, gk, gi = (packed(x, np.int64) for x in (k, i, j, gk, gi))
-        self._slope = packed(g)[None]
-        return JointTables(k, i, j, packed(v), gk, gi, s.constraints.equation_sizes(gk, gi, g),
-                           0 if s.constraints.tabled else self.handle)
-
     @property
     def linear_joints(self) -> bool:
         """True if the joint equations are linear and constant in time."""
         joints = self.plain.joints
         return not (len(joints.hk) or joints.custom or self.motion_varies)
-
-    def offsets(self, times: Array) -> Array:
-        """c of all joints at times (n,), shape (n, m)."""
-        return self.system.constraints.offsets(times)
 
     def slopes(self, times: Array) -> Array:
         """g of all joints at times (n,), shape (n, k), or one row if constant."""
@@ -390,7 +379,7 @@ class Tables:
     def driven(self, times: Array) -> Array:
         """c and, if time-dependent, g of all joints at times (n,), shape (n, m + k) or (n, m)."""
         if not self.turns:
-            return self.offsets(times)
+            return self.system.constraints.offsets(times)
         s = self.system
         both = zip(*(joint.terms(times, s.N) for joint in s.constraints.joints))
         return np.hstack([_beside(x) for x in both])
@@ -406,15 +395,14 @@ class Tables:
 
     @cached_property
     def still(self) -> tuple[Array, Array]:
-        """Constant c and g with two rates, (1, 3, m) and (1, 4, k); zero where time-dependent. g
-        occurs twice: at the end of a step and where the joints act."""
+        """Constant c and g with two rates, (1, 3, m) and (1, 3, k); zero where time-dependent."""
         s, joints, first = self.system, self.plain.joints, np.zeros(1)
-        c, g = np.zeros((1, 3, s.constraints.m)), np.zeros((1, 4, len(joints.gk)))
+        c, g = np.zeros((1, 3, s.constraints.m)), np.zeros((1, 3, len(joints.gk)))
         if s.constraints.m and not joints.custom:
             if not self.motion_varies:
-                c[:, 0] = self.offsets(first)
+                c[:, 0] = s.constraints.offsets(first)
             if not self.turns:
-                g[:, :2] = self.slopes(first)
+                g[:, 0] = self.slopes(first)
         return c, g
 
 

@@ -21,7 +21,7 @@ from ..results.state import State
 from ..solvers.increment import Increment, Options, Route
 from ..solvers.newton import Search, Steps as Rules
 from ..solvers.iteration import StaticResult, LoadStepFailed
-from ..solvers.without_contact import solved_without_contact
+from ..solvers.strategies import solved_without_contact
 from .solve import displacement
 
 logger = logging.getLogger(__name__)

@@ -148,7 +148,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
         while len(points) <= steps:
             start, straight = points[-1], branch is None or len(points) > 1
             try:
-                point = tracer.set_tangent(tracer.advance(start, step), start)
+                point = tracer.advance(start, step)
                 bend = _bend(tracer, start, point, step)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
                     raise LoadStepFailed("the path turns")
@@ -257,14 +257,9 @@ class Tracer:
         return point
 
     def advance(self, start: Point, ds: float) -> Point:
-        """The next point at the distance ds."""
+        """The next point at the distance ds, with its tangent."""
         first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
-        plane, normal = self.weights * start.tangent, self.of_load**2 * start.rate
-
-        def increment(step, dl, dR, dF):  # the plane at distance ds
-            return (ds - plane @ (step + dR) - normal * dl) / (plane @ dF + normal)
-
-        return self.correct(start, first, increment, ds)
+        return self.set_tangent(self.correct(start, first, ds), start)
 
     def _balanced(self, residual, phi, *forces):
         """True if residuals (N,) and (m,) are within tolerance; before K has factors."""
@@ -274,13 +269,13 @@ class Tracer:
         gap = joint_gap(phi, e.joints.sizes)
         return bool(is_balanced(norms[0], norms[1:].max(), gap, rules.tol, rules.force_noise))
 
-    def correct(self, start: Point, first: tuple[Any, Any, Any], increment: Callable[..., float],
-                ds: float) -> Point:
-        """Iterate from ``start`` and first increments of u, multipliers and load."""
-        # ``increment`` gives the next one of the load.
+    def correct(self, start: Point, first: tuple[Any, Any, Any], ds: float) -> Point:
+        """Iterate from ``start`` and first increments of u, multipliers and load, in the plane at
+        the distance ds; if that is infinite, at the load then."""
         system, weights, e = self.system, self.weights, self.system.backend.tables.plain
         u, m, load = start.u, start.multipliers, start.load
         _, stresses = system.assemble(u, load)
+        plane, normal = weights * start.tangent, self.of_load**2 * start.rate
         du, dm, dl = first
         step, work, before, rules = np.zeros(system.N), np.inf, 0.0, self.rules
         for k in range(1, rules.iterations + 1):
@@ -310,7 +305,8 @@ class Tracer:
             except NO_FACTORS:
                 raise LoadStepFailed("the tangent is singular") from None
             dF[system.constraints.fixed] += self.unit
-            dl = increment(step, load - start.load, dR, dF)
+            dl = 0.0 if ds == np.inf else (
+                ds - plane @ (step + dR) - normal * (load - start.load)) / (plane @ dF + normal)
             du, dm = dR + dl * dF, mR + dl * mF
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise LoadStepFailed("the iteration leaves the path")
@@ -362,10 +358,10 @@ def _land(tracer, start, point, load):
         low, high = (x, high) if below else (low, x)
     near = point
     if x < 1.0 - 1e-9:
-        near = tracer.set_tangent(tracer.advance(start, x * h), start)
+        near = tracer.advance(start, x * h)
     ds = (load - near.load) / near.rate
     first = ds * near.tangent, ds * near.multiplier_rate, load - near.load
-    landed = tracer.correct(near, first, lambda step, dl, dR, dF: 0.0, np.inf)
+    landed = tracer.correct(near, first, np.inf)
     landed.load, landed.arc = load, near.arc + ds
     return tracer.set_tangent(landed, start)
 
@@ -383,40 +379,32 @@ def _criticals(tracer, p, q, tol):
         if single or depth == DEPTH:
             if turns and change == 0:
                 continue  # a limit point changes the number: these rates are round-off
-            if turns:
-                out.append(("limit", _limit(tracer, p, a, b, tol), change))
+            if turns:  # the root of the rate of the load by the arc length
+                known = {a.arc: a, b.arc: b}
+
+                def rate(arc, known=known):
+                    if arc not in known:
+                        known[arc] = tracer.advance(p, arc - p.arc)
+                    return known[arc].rate
+
+                # a parabola of the load, with the second derivative from the rates at both ends
+                near = np.sqrt(2e-3 * tol * abs(b.load) * (b.arc - a.arc) / abs(b.rate - a.rate))
+                arc = scipy.optimize.brentq(rate, a.arc, b.arc, xtol=max(near, tol * (
+                    b.arc - p.arc)))
+                out.append(("limit", replace(known[arc], iterations=0, negative=a.negative),
+                            change))
             if not turns or (not single and abs(change) != 1):
                 out.append(("bifurcation", _bifurcation(tracer, p, a, b, tol), change))
             continue
-        middle = _at(tracer, p, 0.5 * (a.arc + b.arc))
+        middle = tracer.advance(p, 0.5 * (a.arc + b.arc) - p.arc)
         stack += [(middle, b, depth + 1), (a, middle, depth + 1)]
     return out
-
-
-def _at(tracer, p, arc):
-    """The point at an arc length after p."""
-    return tracer.set_tangent(tracer.advance(p, arc - p.arc), p)
-
-
-def _limit(tracer, p, a, b, tol):
-    """The limit point between a and b: the root of the rate of the load by the arc length."""
-    known = {a.arc: a, b.arc: b}
-
-    def rate(arc):
-        if arc not in known:
-            known[arc] = _at(tracer, p, arc)
-        return known[arc].rate
-
-    # a parabola of the load, with the second derivative from the rates at both ends
-    near = np.sqrt(2e-3 * tol * abs(b.load) * (b.arc - a.arc) / abs(b.rate - a.rate))
-    arc = scipy.optimize.brentq(rate, a.arc, b.arc, xtol=max(near, tol * (b.arc - p.arc)))
-    return replace(known[arc], iterations=0, negative=a.negative)
 
 
 def _bifurcation(tracer, p, a, b, tol):
     """Where the count of negative eigenvalues changes: bisection, and secants of the smallest."""
     end = tol * (b.arc - p.arc)
-    mode, values = None, {}
+    v, m, values = None, None, {}
     low, high, best = a, b, b
     for _ in range(100):
         x = 0.5 * (low.arc + high.arc)
@@ -426,28 +414,23 @@ def _bifurcation(tracer, p, a, b, tol):
             # overshoot slightly, so that both ends converge
             guess += np.sign(x - guess) * 0.1 * min(guess - low.arc, high.arc - guess)
             x = guess
-        best = _at(tracer, p, x)
-        mode, value = _smallest(tracer, best, mode)
-        values[best.arc] = value
+        best = tracer.advance(p, x - p.arc)
+        # the eigenvalue closest to zero of the tangent over its diagonal, by the inverse power
+        # method from the last mode
+        system, first = tracer.system, v is None
+        tracer.factorize(best)
+        D = np.abs(system.K.diagonal()) * system.constraints.mask
+        if first:
+            v = np.random.default_rng(0).standard_normal(system.N)
+        v = v * system.constraints.mask
+        for _ in range(12 if first else 4):
+            unit = v / np.sqrt(v @ (D * v))
+            v, m = system.solver.solve(D * unit, np.zeros(system.constraints.m))
+            values[best.arc] = 1.0 / (unit @ (D * v))
         low, high = (best, high) if best.negative == a.negative else (low, best)
         if high.arc - low.arc <= end:
             break
-    v, m = mode
     return replace(best, iterations=0, rate=0.0, tangent=v / tracer.norm(v),
                    multiplier_rate=m / tracer.norm(v), negative=a.negative)
 
 
-def _smallest(tracer, point, start=None):
-    """The eigenvalue closest to zero of the tangent stiffness over its diagonal, and its vector."""
-    # By the inverse power method from ``start``, a vector (N,) and multipliers (m,).
-    system = tracer.system
-    tracer.factorize(point)
-    D, none = np.abs(system.K.diagonal()) * system.constraints.mask, np.zeros(system.constraints.m)
-    x = np.random.default_rng(0).standard_normal(system.N) if start is None else start[0]
-    x, value = x * system.constraints.mask, np.nan
-    for _ in range(12 if start is None else 4):
-        x = x / np.sqrt(x @ (D * x))
-        y, m = system.solver.solve(D * x, none)
-        value = 1.0 / (x @ (D * y))
-        x = y
-    return (x, m), value

@@ -7,8 +7,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from ..beam.kernels.kernel import ElementsWithHistory
 from ..core.band import fix
-from ..core import (NO_FACTORS, Array, ConvergenceError, InputError, ModelWarning, SupportError,
-                    refuse, require_integer, retold, warn)
+from ..core import (NO_FACTORS, Array, ConvergenceError, ModelWarning, SupportError, refuse,
+                    require_integer, retold, warn)
 from ..equations.matrices import Inverse, StrainTangent
 from ..equations.rank import is_symmetric
 from ..equations.system import System
@@ -41,10 +41,12 @@ def modes(system: System, state: State, k: int) -> Modes:
     # stick, also if they slip.
     system = system.after(state.memory).sticking()
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
-    if tangent.size[0] <= DENSE:
-        tangent.require_independent()
-    M = _free_mass(system, tangent)
     n, m = tangent.size
+    if m and n <= DENSE:
+        R = scipy.linalg.qr(tangent.J.toarray().T, mode="r")[0]
+        refuse(np.min(np.abs(np.diag(R))) < 1e-12 * np.max(np.abs(R)),
+               "the joints are dependent in this state", error=SupportError)
+    M = _free_mass(system, tangent)
     k = _count(k, n - m)
     shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
     tangent.balance(M, shift)
@@ -167,7 +169,14 @@ def _sparse(tangent, state, M, k, shift):
     start = inverse.solve(rng.standard_normal(M.shape[0]))
     apply = inverse.once if inverse.left < UNREFINED else inverse.solve
     values, X = _polished(tangent, M, inverse, _lanczos(M, k, shift, apply, start))
-    while missing := _missing(tangent, state, shift, values):
+    while True:
+        below = values[-1] - SAME * max(abs(values[-1]), shift)
+        try:  # the number below the largest one found, by Sylvester's law of inertia
+            missing = _negative(tangent, state, -below) - int(np.sum(values < below))
+        except NO_FACTORS:
+            missing = 1
+        if missing <= 0:
+            break
 
         def others(b, X=X, theta=1.0 / (values + shift)):
             return apply(b) - X @ (theta * (X.T @ b))
@@ -189,17 +198,6 @@ def _lanczos(M, k, shift, apply, start):
     except ArpackNoConvergence as failure:
         raise ConvergenceError(f"Lanczos found {len(failure.eigenvalues)} of {k} modes; try "
                                "another number") from None
-
-
-def _missing(tangent, state, shift, values):
-    """Number of missing eigenvalues below the largest one found, by Sylvester's law of inertia."""
-    # It is 1 if there are no factors.
-    below = values[-1] - SAME * max(abs(values[-1]), shift)
-    try:
-        number = _negative(tangent, state, -below)
-    except NO_FACTORS:
-        return 1
-    return max(number - int(np.sum(values < below)), 0)
 
 
 def _quotients(tangent, M, X):
@@ -260,16 +258,17 @@ def buckling(system: System, k: int, state: State | None = None) -> Buckling:
         change = (domain.stiffness(h * du[s]) - domain.stiffness(-h * du[s])) / (2.0 * h)
         K = sparse.csr_matrix((change, (s.start + i, s.start + j)), shape=(system.N, system.N))
         Ks = Ks + K[tangent.free][:, tangent.free]
-    if not Ks.nnz or not abs(Ks).max() > 0.0:
-        raise InputError("no positive load factor: the loads do not stress the beam")
+    refuse(not Ks.nnz or not abs(Ks).max() > 0.0,
+           "no positive load factor: the loads do not stress the beam")
     symmetric = is_symmetric(Ks, system.constraints.coordinate_sizes[tangent.free])
     theta, X = _buckled(tangent, Ks, k, symmetric)
     # mean prebuckling strain at the load factor 1
     strain = np.sqrt(max(float(du @ tangent.internal(stress)), 0.0)) * np.finfo(float).eps
     good = theta < -strain / system.scales.strain_noise
-    if not np.any(good):
-        raise InputError("no positive load factor: these loads stiffen the beam"
-                         if symmetric else _FLUTTER)
+    refuse(not np.any(good), "no positive load factor: these loads stiffen the beam" if symmetric
+           else "no real positive load factor: these follower loads have no potential, and no "
+           "neighbouring equilibrium exists. Check for flutter with scene.modes(k, state) about "
+           "states under load: modes.flutter is True beyond the critical load")
     factors = -1.0 / theta[good]
     order = np.argsort(factors)[:k]
     before = 0.0 * du if state is None else state.u
@@ -291,17 +290,16 @@ def _linear_response(system, state):
         zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
         tangent = StrainTangent(system, zero, 0.0, None, none)
         return tangent, tangent, *tangent.response()
-    if not np.array_equal(state.system.constraints.fixed, system.constraints.fixed):
-        raise InputError("the state has other supports than the scene: buckling() adds loads to "
-                         "those of the state, and supports and joints stay")
-    if state.stability == "unstable":
-        raise InputError("the state is unstable: its own loads are beyond the buckling load"
-                         if state.load else "the scene is unstable before there is any load: what "
-                         "load factors do not scale is beyond the buckling load")
+    refuse(not np.array_equal(state.system.constraints.fixed, system.constraints.fixed),
+           "the state has other supports than the scene: buckling() adds loads to those of the "
+           "state, and supports and joints stay")
+    refuse(state.stability == "unstable", "the state is unstable: its own loads are beyond the "
+           "buckling load" if state.load else "the scene is unstable before there is any load: "
+           "what load factors do not scale is beyond the buckling load")
     tangent = StrainTangent(state.system.after(state.memory), state.u, state.load, state.t,
                             state.multipliers)
     loads = StrainTangent(system, state.u, 0.0, None, state.multipliers)
-    return tangent, loads, *tangent.added(system.external_force(state.u))
+    return tangent, loads, *tangent.response(system.external_force(state.u))
 
 
 def _prestressed(system):
@@ -354,12 +352,6 @@ def _say_yielding(system, before, du):
                          "stiffness: bifurcations of scene.continuation() have the load of what "
                          "yields", ModelWarning)
                     return
-
-
-_FLUTTER = (
-    "no real positive load factor: these follower loads have no potential, and no neighbouring "
-    "equilibrium exists. Check for flutter with scene.modes(k, state) about states under load: "
-    "modes.flutter is True beyond the critical load")
 
 
 def _buckled(tangent, Ks, k, symmetric):

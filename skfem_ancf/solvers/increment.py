@@ -12,6 +12,7 @@ from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, 
 from ..equations.evaluation import DRAG, FORCE, GAP, MOVED, ROWS, U, Target
 from ..equations.system import System
 from . import strategies
+from .continuation import Point, Tracer
 from .iteration import (CONVERGED, DIVERGES, INDEFINITE, ITERATIONS, NOT_CONVERGED, SINGULAR,
                         Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                         StaticResult, TooManyIterations, Unstable, equilibrium)
@@ -83,23 +84,63 @@ class Increment:
         self.load, self.time = options.route.load_and_time(level)
         self.record = LoadStep(level)
 
+    @np.errstate(all="ignore")  # overflow shows in the residual
     def solve(self, stable: bool) -> Equilibrium:
         """The equilibrium, a stable one if requested; raises LoadStepFailed."""
-        with np.errstate(all="ignore"):  # overflow shows in the residual
-            system, start, route = self.system, self.start, self.options.route
-            found = self._augmented()
-            passed = system.forces.passed((start.u, route.load_and_time(start.load)[1]),
-                                          (found.u, self.time))
-            if passed:
-                raise LoadStepFailed(passed)
-            if not stable or start.unstable:
-                return found
-            if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
-                raise Unstable("the equilibrium found is unstable", found)
-            if (start.rejected and route.proportional and start.load > 0.0
-                    and not strategies.heads_on(system, start, found.u)):
-                raise Unstable("the equilibrium found lies on the side away from the load", found)
+        system, start, route = self.system, self.start, self.options.route
+        contacts = system.forces.contacts
+        found = (strategies.ContactSearch(self).find() if contacts.obstacles else
+                 self.from_start(self.options))
+        # Pressures are corrected until the penetration is within tolerance. Where the body alone is
+        # unstable, as a buckled strip at a wall, this converges only if obstacles are stiffer than
+        # it is unstable, see Bertsekas: "Constrained Optimization and Lagrange Multiplier Methods",
+        # Academic Press 1982, 2.2.
+        for _ in range(AUGMENTED):
+            if not system.forces.corrected(found.u, self.time):
+                break
+            found = self.iterate(found)
+        for k in range(1, AUGMENTED + 1):
+            if not contacts.augmented or contacts.augment(found.u, self.time) == 0:
+                break
+            if k % SLOW == 0:
+                stiffening = np.where(contacts.with_multipliers, STIFFER, 1.0) * (
+                    1.0 + contacts.stiffening) - 1.0
+                contacts.stiffen(np.minimum(stiffening, STIFFEST), found.u, self.time)
+            found = self.iterate(found)
+        else:
+            raise LoadStepFailed("the penetration of obstacles is above its tolerance after "
+                                 f"{AUGMENTED} corrections of the pressure")
+        passed = system.forces.passed((start.u, route.load_and_time(start.load)[1]),
+                                      (found.u, self.time))
+        if passed:
+            raise LoadStepFailed(passed)
+        if not stable or start.unstable:
             return found
+        try:  # the last factors usually decide; else those of the tangent at the solution
+            stays = system.solver.stays()
+        except NO_FACTORS:
+            stays = False
+        if not stays and stability.verdict(system, found.u, self.load, found.multipliers,
+                                           self.time).stability == "unstable":
+            raise Unstable("the equilibrium found is unstable", found)
+        if start.rejected and not self._heads_on(found.u):
+            raise Unstable("the equilibrium found lies on the side away from the load", found)
+        return found
+
+    def _heads_on(self, u):
+        """True if u lies on the side of the last equilibrium to which the load increment points."""
+        # Close to a bifurcation an iteration may jump to the other side. The displacement is
+        # compared with the tangent of the path of proportional loads.
+        system, start = self.system, self.start
+        if (not self.options.route.proportional or start.load == 0.0
+                or system.forces.contacts.moving):  # the tangent has no motion of obstacles
+            return True
+        try:
+            ahead = Tracer(system).set_tangent(Point(
+                system, start.u, start.multipliers, start.load, start.u)).tangent
+        except LoadStepFailed:
+            return True
+        return bool(ahead @ (stability.position_weights(system) * (u - start.u)) >= 0.0)
 
     def resting(self) -> Equilibrium | None:
         """The last equilibrium, if only round-off acts there; else None."""
@@ -126,31 +167,6 @@ class Increment:
             "rubbed": start.rubbed + lost, "memory": memory, "u": found.u,
             "multipliers": found.multipliers, "force": found.force, "seen": found.seen})
 
-    def _augmented(self):
-        """Repeat with corrected pressures until the penetration is within tolerance."""
-        # Where the body alone is unstable, as a buckled strip at a wall, corrections converge only
-        # if obstacles are stiffer than it is unstable, see Bertsekas: "Constrained Optimization and
-        # Lagrange Multiplier Methods", Academic Press 1982, 2.2.
-        contacts = self.system.forces.contacts
-        found = (strategies.ContactSearch(self).find() if contacts.obstacles else
-                 self.from_start(self.options))
-        for _ in range(AUGMENTED):
-            if not self.system.forces.corrected(found.u, self.time):
-                break
-            found = self.iterate(found)
-        if not contacts.augmented:
-            return found
-        for k in range(1, AUGMENTED + 1):
-            if contacts.augment(found.u, self.time) == 0:
-                return found
-            if k % SLOW == 0:
-                stiffening = np.where(contacts.with_multipliers, STIFFER, 1.0) * (
-                    1.0 + contacts.stiffening) - 1.0
-                contacts.stiffen(np.minimum(stiffening, STIFFEST), found.u, self.time)
-            found = self.iterate(found)
-        raise LoadStepFailed("the penetration of obstacles is above its tolerance after "
-                             f"{AUGMENTED} corrections of the pressure")
-
     def from_start(self, options: Options) -> Equilibrium:
         """Iterate from the last equilibrium; if that fails, from the equilibrium of Hooke's law,
         which is close to the final one. A correction that turns a beam far strains it temporarily,
@@ -160,7 +176,7 @@ class Increment:
         if not system.histories.path_dependent:
             backend = system.backend.linearised
         elif system.clock is None:
-            backend = system.backend.elastic_from(start.u)
+            backend = system.backend.after(system.backend.tables.elastic_from(start.u))
         if start.diverging or backend is None:
             return self.iterate(options=options)
         if not system.histories.path_dependent:
@@ -275,6 +291,7 @@ class Increment:
         raise LoadStepFailed("the tangent is singular" if status == SINGULAR else
                              "the strain is not finite")
 
+    @np.errstate(all="ignore")  # overflow shows in the residual
     def rescue(self, failure: LoadStepFailed) -> Equilibrium | None:
         """A stable equilibrium if the path has lost its stability, else None."""
         system, start, route = self.system, self.start, self.options.route
@@ -285,14 +302,27 @@ class Increment:
         if not unstable and not strategies.near_limit(system, start):
             return None
         if not stability.has_potential(system, start.u, self.load):
-            if not isinstance(failure, Unstable):
+            if not unstable:
                 return None
             start.unstable = True
             start.doubt = (f"the path is unstable from the load level {self.level:.6g} on, and the "
                            "loads have no potential by which to find a stable equilibrium")
             return failure.found
-        with np.errstate(all="ignore"):
-            found, saw_unstable = strategies.leave_unstable(self)
+        # of all radii, the first result to which the load drives the scene is preferred
+        options, found = self.options._replace(most=strategies.DESCENT, watched=False), None
+        saw_unstable = False
+        for radius in strategies.RADII:
+            descent = strategies.Descent(system, radius)
+            try:
+                other = strategies.descend(self, options, descent)
+            except (LoadStepFailed, *NO_FACTORS) as error:
+                logger.info("no descent at load %.6g: %s", self.level, error)
+                continue
+            heads_on = self._heads_on(other.u)
+            if heads_on or found is None:
+                found, saw_unstable = other, descent.saw_unstable
+            if heads_on:
+                break
         if saw_unstable and not start.doubt:
             start.doubt = (
                 f"the path loses its stability between the load levels {start.load:.6g} and "

@@ -1,7 +1,7 @@
 """The equilibrium iteration, Newton's method and the mixed iteration; results and failures."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -115,9 +115,14 @@ class Equilibrium(NamedTuple):
 
 
 class LoadStepFailed(Exception):
-    """A load step did not converge; the message says why, ``load`` at which level."""
+    """A load step did not converge; the message says why, ``load`` at which level. ``found`` is
+    the last Equilibrium, or displacement and multipliers, of some failures."""
 
     load = 1.0
+
+    def __init__(self, message: str, found: Any = None) -> None:
+        super().__init__(message)
+        self.found = found
 
 
 class Diverging(LoadStepFailed):
@@ -125,11 +130,7 @@ class Diverging(LoadStepFailed):
 
 
 class TooManyIterations(LoadStepFailed):
-    """The iterations have not sufficed; ``reached`` are the last displacement and multipliers."""
-
-    def __init__(self, message: str, reached: tuple[Array, Array]) -> None:
-        super().__init__(message)
-        self.reached = reached
+    """The iterations have not sufficed; ``found`` are the last displacement and multipliers."""
 
 
 class UnboundedMotion(LoadStepFailed):
@@ -142,10 +143,6 @@ class FirstStepTooLarge(LoadStepFailed):
 
 class Unstable(LoadStepFailed):
     """A load step ended at an unstable equilibrium, ``found``."""
-
-    def __init__(self, message: str, found: Equilibrium) -> None:
-        super().__init__(message)
-        self.found = found
 
 
 # the iteration

@@ -19,27 +19,19 @@ from .continuation import continuation
 from .increment import Increment, Options, Route
 from .iteration import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
-from .strategies import MOST_FROM_SOFT
-from .without_contact import solved_without_contact
 
 logger = logging.getLogger(__name__)
 
-#: Largest number of iterations in a load step.
-MAX_ITERATIONS = 10000
 #: Number of iterations of load steps, of which one fails then, before the next strategy.
 FEW = 150
 #: Largest number of iterations of all strategies for the whole load, in scenes with obstacles.
 MOST = 1000
-#: Number of unstabilised equilibria after which the search without friction ends.
-UNSTABILISED = 2
 #: Largest number of iterations of a user-defined energy's equilibrium close to the reference
 #: configuration: beyond a pole of the energy there are others.
 SURE = 6
 #: Rotation of an axis of degree 7 or less over one element, in radians, that is tried again:
 #: round-off may be its reason.
 FOLDED = 2.5
-#: Largest number of steps along the path to a limit point.
-PATH = 100
 #: Methods and their names; "auto" tries several strategies, the others are a single iteration.
 METHODS = {"mixed": "the mixed iteration", "newton": "Newton's method", "auto": ""}
 
@@ -107,7 +99,7 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     tol, min_step = require_positive("tol", tol), require_positive("min_step", min_step)
     if not 0.0 < require_positive("first_step", first_step) <= 1.0:
         raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
-    max_iterations = require_integer("max_iterations", max_iterations, 1, MAX_ITERATIONS)
+    max_iterations = require_integer("max_iterations", max_iterations, 1, 10000)
     if u is not None:
         u = require_finite("u", u, (system.N,))
     rules = Steps(method, tol, max_iterations, float(first_step), min_step)
@@ -164,7 +156,8 @@ class Search:
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""
-        found = solved_without_contact(self.system, self.route.u, self._memory, self._free)
+        found = strategies.solved_without_contact(self.system, self.route.u, self._memory,
+                                                  self._free)
         if found is not None:
             return found
         for name, solve in self._strategies():
@@ -184,7 +177,8 @@ class Search:
                     self._failure = failure
                 if self._exhausted or isinstance(failure, UnboundedMotion):
                     break
-                if self._unstabilised == UNSTABILISED and not self._has_friction:
+                # without friction others would be as loose as the first two
+                if self._unstabilised == 2 and not self._has_friction:
                     break
                 continue
             self._note(name)
@@ -253,7 +247,7 @@ class Search:
                 return point.load < loads[-2] or point.stable is False
 
             try:
-                _, critical = continuation(system, PATH, max_load=1.0, until=turned, locate=1e-6,
+                _, critical = continuation(system, 100, max_load=1.0, until=turned, locate=1e-6,
                                            progress=False)
             except (AncfError, *NO_FACTORS):
                 critical = []
@@ -323,7 +317,7 @@ class Search:
         route, result = self.route, self._beginning(self.route)
         options = self._options(route, method, watched=True)
         if self.touches and self.stable:  # a descent follows
-            options = options._replace(patience=MOST_FROM_SOFT)
+            options = options._replace(patience=strategies.MOST_FROM_SOFT)
         step = Increment(self.system, result, 1.0, options)
         try:
             found = step.solve(self.stable)
@@ -390,7 +384,8 @@ class Search:
                 system.after(result.memory), result.u, result.multipliers):
             self._loose, self._unstabilised = "", self._unstabilised + 1
             try:  # from the last factors
-                if (v := strategies.Descent(system).lowest_direction()) is not None:
+                value, v = strategies.Descent(system).extreme("SA")
+                if value < 0.0:
                     self._loose = stability.motion_in_words(system, result.u, v)
             except NO_FACTORS:
                 pass
@@ -443,7 +438,8 @@ class Search:
                     logger.info("load %.6g failed (%s), step cut", load, failure)
                     size, found = 0.25 * (load - result.load), None
                     many = few and spent + step.record.iterations >= FEW * patience
-                    if stable and (cuts > strategies.CUTS or size < rules.min_step or many):
+                    # so many cuts at unstable points show that the path is unstable
+                    if stable and (cuts > 3 or size < rules.min_step or many):
                         found = step.rescue(failure)
                     if found is None and (size < rules.min_step or many or self._exhausted):
                         failure.load = load

@@ -1,4 +1,5 @@
-"""Strategies where an iteration finds nothing: descent from an unstable point, contact search.
+"""Strategies where an iteration finds nothing or takes long: descent from an unstable point, search
+in contact, and the scene without contact.
 
 In contact: a suitable start, then stiffening obstacles. A belt that just does not touch its pulley
 has no transverse stiffness: the first correction is far too large, and shorter ones close the
@@ -13,24 +14,24 @@ energy.
 """
 
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import eigsh
 
-from ..actions.contact.contacts import LARGEST_FACTOR, YIELDS, Contacts
+from ..actions.contact.contacts import LARGEST_FACTOR, YIELDS
 from ..actions.contact.tables import ANCHORED, BILATERAL, is_clear, stiffness_factor
 from ..actions.forces.kernels import nothing_touches
 from ..actions.forces.springs import Turns
-from ..core import NO_FACTORS, Array, handle_of
+from ..beam.kinematics import tangents
+from ..core import NO_FACTORS, Array, ConvergenceError, handle_of
 from ..core.band import fix
+from ..equations.evaluation import motion_is_clear
 from ..equations.stability import (inverse_on_positions, largest_displacement, position_weights,
-                                   potential, response, verdict)
+                                   response, verdict)
 from ..equations.system import System
-from .continuation import Point, Tracer
 from .iteration import Equilibrium, LoadStepFailed, TooManyIterations, StaticResult
 
 logger = logging.getLogger(__name__)
@@ -42,12 +43,6 @@ KICK = 0.02
 #: Size of small corrections, number of consecutive small ones that indicates a stall at an unstable
 #: point, and number of inverse iterations for the softest direction.
 SMALL, STALLED, POWERS = 1e-3, 4, 4
-#: Number of unstable points that a descent may leave.
-KICKS = 6
-#: Ratio of compliances that indicates a limit point.
-SOFTER = 8.0
-#: Number of step cuts at unstable points before the path counts as unstable.
-CUTS = 3
 #: Iterations of a descent, and over those of Newton's method at its end.
 DESCENT, SHORTER = 200, 7
 #: Largest radius, and displacement that counts as diverged, relative to the scene's size.
@@ -57,20 +52,6 @@ WIDEST, LOST = 0.5, 20.0
 BACK, ONWARD, AWAY = 50, 0.5, 0.01
 #: How often a correction through an obstacle is halved.
 HALVED = 8
-
-
-def heads_on(system: System, start: StaticResult, u: Array) -> bool:
-    """True if ``u`` lies on the side of the last equilibrium to which the load increment points."""
-    # Close to a bifurcation an iteration may jump to the other side. The displacement is compared
-    # with the tangent of the path; moving obstacles are not tested.
-    if system.forces.contacts.moving:
-        return True  # the tangent has no motion of obstacles
-    point = Point(system, start.u, start.multipliers, start.load, start.u)
-    try:
-        ahead = Tracer(system).set_tangent(point).tangent
-    except LoadStepFailed:
-        return True
-    return bool(ahead @ (position_weights(system) * (u - start.u)) >= 0.0)
 
 
 def near_limit(system: System, start: StaticResult) -> bool:
@@ -83,10 +64,10 @@ def near_limit(system: System, start: StaticResult) -> bool:
                                    (np.zeros(system.N), none, 0.0)):
             system.assemble(u, at)
             system.solver.factorize(u, at, multipliers)
-            ratio.append(descent.compliance())
+            ratio.append(max(0.0, descent.extreme("LA")[0]))
     except NO_FACTORS:
         return True
-    return ratio[0] > SOFTER * ratio[1]
+    return ratio[0] > 8.0 * ratio[1]
 
 
 class Descent:
@@ -102,14 +83,11 @@ class Descent:
         self._weights = position_weights(system)
         self._sizes = system.constraints.coordinate_sizes
         self._radius, self._largest = radius, min(5.0 * radius, WIDEST)
-        self._shift, self._before = 0.0, np.zeros(system.N)
+        #: multiple of the identity in the last tangent, 0 for that of Newton's method
+        self.shift = 0.0
+        self._before = np.zeros(system.N)
         self._small = self._calls = 0
         self._passed: list[Array] = []
-
-    @property
-    def shifted(self) -> bool:
-        """True if the last tangent was made definite: it was not that of Newton's method."""
-        return self._shift > 0.0
 
     def onward(self) -> tuple[Array, Array] | None:
         """The displacement and its last change (N,) of a motion without end; else None."""
@@ -133,7 +111,7 @@ class Descent:
         found = self._bounded(lambda: self.system.solver.factorize(u, t, multipliers), R, phi)
         if found is None:
             raise np.linalg.LinAlgError("no shift suffices")
-        small = (self._shift > 0.0 and np.max(np.abs(found[0] / self._sizes)) < SMALL
+        small = (self.shift > 0.0 and np.max(np.abs(found[0] / self._sizes)) < SMALL
                  and not self.system.constraints.missing_supports)  # no rigid motion
         self._small = self._small + 1 if small else 0
         du[:], dm[:] = found
@@ -182,41 +160,29 @@ class Descent:
         least = 1e-14 * scale
         # of a rigid motion the stiffness may be round-off, of any sign
         free = bool(system.constraints.missing_supports)
-        found, shift = correction(free * least), max(self._shift, 100.0 * least)
+        found, shift = correction(free * least), max(self.shift, 100.0 * least)
         if found is not None:
-            self._shift = 0.0
+            self.shift = 0.0
             return found
-        found = correction(shift)
-        if found is None:  # increase
-            while found is None and shift < 1e6 * scale:
-                shift *= 10.0
-                found = correction(shift)
-            self._shift = shift
-            return found
-        while shift > 10.0 * least:  # decrease
+        found, grown = correction(shift), False
+        while found is None and shift < 1e6 * scale:
+            shift, grown = 10.0 * shift, True
+            found = correction(shift)
+        while found is not None and not grown and shift > 10.0 * least:
             less = correction(0.1 * shift)
             if less is None:
                 break
             found, shift = less, 0.1 * shift
-        self._shift = shift
+        self.shift = shift
         return found
 
     def product(self, a: Array, b: Array) -> float:
         """Scalar product of nodal displacements (N,)."""
         return float(a @ (self._weights * b))
 
-    def lowest_direction(self) -> Array | None:
-        """The direction v (N,) of the most negative ``v . K v``, from the factors, or None."""
-        value, v = self._extreme("SA")
-        return v if value < 0.0 else None
-
-    def compliance(self) -> float:
-        """The largest nodal displacement for unit forces, from the factors."""
-        return max(0.0, self._extreme("LA")[0])
-
-    def _extreme(self, which):
+    def extreme(self, which: str) -> tuple[float, Array]:
         """The smallest ("SA") or largest ("LA") eigenvalue of K^-1 on the nodal positions, and the
-        displacement (N,) by its vector of forces."""
+        displacement (N,) by its vector of forces; by the last factors."""
         inverse, G = inverse_on_positions(self.system)
         if not G.shape[0]:
             return 0.0, np.zeros(self.system.N)
@@ -229,26 +195,6 @@ class Descent:
         return float(values[k]), inverse(Y[:, k])
 
 
-def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
-    """The result of :func:`descend`, or None, and whether an unstable tangent was met."""
-    # Of all radii, the first result to which the load drives the scene is preferred.
-    system, start, level = increment.system, increment.start, increment.level
-    options = increment.options._replace(most=DESCENT, watched=False)
-    first: tuple[Any, bool] = None, False
-    for radius in RADII:
-        descent = Descent(system, radius)
-        try:
-            found = descend(increment, options, descent)
-        except (LoadStepFailed, *NO_FACTORS) as failure:
-            logger.info("no descent at load %.6g: %s", level, failure)
-            continue
-        if (not options.route.proportional or start.load == 0.0
-                or heads_on(system, start, found.u)):
-            return found, descent.saw_unstable
-        first = (found, descent.saw_unstable) if first[0] is None else first
-    return first
-
-
 def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
     """A stable equilibrium at a load beyond which the path is unstable."""
     # Corrections of :class:`Descent` start from the last stable equilibrium. An unstable point is
@@ -256,39 +202,35 @@ def descend(increment: Any, options: Any, descent: Descent) -> Equilibrium:
     # potential.
     system, start, load = increment.system, increment.start, increment.load
     u, multipliers = start.u, start.multipliers
-    for _ in range(KICKS):
+    for _ in range(6):  # unstable points that it may leave
         try:
             found = increment.iterate((u, multipliers), options, descent)
         except TooManyIterations as failure:
             # at its end Newton's method is better, where a mode is very soft
-            if descent.shifted or system.forces.contacts.obstacles or system.forces.changing:
+            if descent.shift > 0.0 or system.forces.contacts.obstacles or system.forces.changing:
                 raise  # far from the end, or where it may leave what is touched
-            found = increment.iterate(failure.reached, options._replace(
+            found = increment.iterate(failure.found, options._replace(
                 method="newton", most=options.most // SHORTER))
         u, multipliers = found.u, found.multipliers
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
             return found
         descent.saw_unstable = True
-        v = descent.lowest_direction()
-        if v is None:  # the unstable direction does not move the nodes
+        value, v = descent.extreme("SA")
+        if value >= 0.0:  # the unstable direction does not move the nodes
             break
         v = KICK * system.size / np.max(np.abs(v)) * v
-        u = u + _side(system, descent, v, u, start.u, load) * v
+        ahead = descent.product(v, start.u - u)
+        if not abs(ahead) > 1e-6 * descent.product(v, v):  # across the way back
+            turns = Turns(system)
+            near = turns.begin(u)
+            here, up, down = (  # total potentials
+                system.strain_energy(x, load) + load * system.load_potential(
+                    x, turned=turns.follow(near, x[None])[0]) for x in (u, u + v, u - v))
+            ahead = down - up
+            if not abs(ahead) > 1e-6 * abs(up + down - 2.0 * here):  # symmetric: either side
+                ahead = v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))]
+        u = u + (v if ahead > 0 else -v)
     raise LoadStepFailed("no stable equilibrium found along the unstable directions")
-
-
-def _side(system, descent, v, u, last, load):
-    """On which side to leave an unstable point along v: 1 or -1."""
-    back = descent.product(v, last - u)
-    if abs(back) > 1e-6 * descent.product(v, v):
-        return 1.0 if back > 0 else -1.0
-    turns = Turns(system)
-    near = turns.begin(u)
-    here, up, down = (potential(system, x, load, turns.follow(near, x[None])[0])
-                      for x in (u, u + v, u - v))
-    if abs(up - down) > 1e-6 * abs(up + down - 2.0 * here):
-        return 1.0 if up < down else -1.0
-    return 1.0 if v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))] > 0 else -1.0
 
 
 #: Tolerance of an equilibrium that is only a start.
@@ -297,8 +239,6 @@ CLOSE = 1e-2
 NEAR, FAR = 0.5, 1e3
 #: Least fraction of the surface that is near an obstacle if points are bound.
 PART = 0.03
-#: Mean penetration after the release, relative to the height.
-RELEASED = 0.1
 #: Penetrations relative to the height, and relative stored energy, above which an obstacle is too
 #: soft: deeper than the first, or deeper than the second with more energy.
 DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
@@ -314,67 +254,6 @@ MOST_DIRECT, MOST_FROM_SOFT = 8, 15
 TIMES, RETRIED = 4, 2
 
 
-def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
-    """Flags of points near an obstacle by group; None if they are few, or already in contact."""
-    flags, most, pressed = [], 0.0, 0.0
-    if is_clear(contacts.tables.clear, u, NEAR * max(group.height for _, group in contacts.groups)):
-        return None
-    for (_, group), _, gap in contacts.look(u, t):
-        flags.append(gap < NEAR * group.height)
-        whole = group.areas.sum()
-        most = max(most, group.areas[flags[-1]].sum() / whole)
-        pressed = max(pressed, group.areas[gap < 0.0].sum() / whole)
-    return flags if most > PART and most > 2.0 * pressed else None
-
-
-@contextmanager
-def bound(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
-    """Bind flagged points to obstacles without friction inside the block."""
-    memory = contacts.tables.memory
-    before = memory.copy()
-    try:
-        memory[ANCHORED], memory[BILATERAL] = 0.0, 1.0
-        for k, ((_, group), flag) in enumerate(zip(contacts.groups, flags)):
-            pair = contacts.tables.pairs[k]
-            far = FAR * group.height * stiffness_factor(pair)
-            pair.multipliers[:], pair.largest[0] = far * flag, far
-        yield
-    finally:
-        memory[:] = before
-
-
-def releasing_stiffening(contacts: Contacts, u: Array, t: float) -> Array:
-    """The stiffening with which the mean pressure keeps all points in contact, shape (groups,)."""
-    out = contacts.stiffening.copy()
-    for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
-        deep = np.maximum(-gap, 0.0)
-        if np.any(deep):
-            mean = group.areas @ deep / group.areas[deep > 0.0].sum()
-            most = max(1.0, group.largest_factor / LARGEST_FACTOR)
-            out[k] = min(most, (1.0 + out[k]) * mean / (RELEASED * group.height)) - 1.0
-    return out
-
-
-def required_stiffening(contacts: Contacts, u: Array, t: float, energy: float,
-                      yields: Array) -> Array:
-    """The required stiffening, shape (groups,); at least the present one."""
-    # ``energy`` is the strain energy including that of the penetration, ``yields`` the result of
-    # :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`.
-    now, stored = contacts.stiffening, contacts.potential(u, t)
-    out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
-    for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
-        part = (1.0 + now[k]) / (1.0 + out[k])  # penetration at this pressure, stiffened
-        deep, stores = -part * float(gap.min()) / group.height, part * share
-        if deep > DEEP or (deep > SEEN and stores > STORED):
-            more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
-            most = group.largest_factor / LARGEST_FACTOR
-            out[k] = max(1.0, min(most, (1.0 + out[k]) * more)) - 1.0
-        if yields[k] > YIELDS:
-            more = min(group.largest_factor, (1.0 + now[k]) * yields[k] / (LEFT * YIELDS))
-            out[k] = max(out[k], more - 1.0)
-    return out
-
-
 class ContactSearch:
     """The search for an equilibrium in contact at the end of an increment. Obstacles have the
     contact history at its start."""
@@ -388,21 +267,18 @@ class ContactSearch:
     def find(self) -> Equilibrium:
         """The equilibrium on obstacles that are stiff enough."""
         options, before = self.increment.options, self._memory.copy()
-        ways: list[Callable[[], Any]] = [self._from_soft, self._directly]
-        flags = None
+        ways: list[Callable[[], Any]]
         if options.drag is not None:  # which already stabilises the iteration
             ways = [self._directly]
         elif options.close:  # to the equilibrium: few iterations are tried
             ways = [partial(self.solve, None, False, MOST_DIRECT),
                     partial(self._from_soft, MOST_FROM_SOFT)]
         else:
-            flags = lies_near(self.contacts, *self.start)
-        if flags is not None:
-            ways.insert(0, partial(self._released, flags))
+            ways = [self._released, self._from_soft, self._directly]
         *first, last = ways
         for strategy in first:
             try:
-                return self._stiffened(strategy(), flags is not None and strategy is first[0])
+                return self._stiffened(strategy(), strategy == self._released)
             except LoadStepFailed:
                 self._memory[:] = before
         return self._stiffened(last(), False)
@@ -425,12 +301,37 @@ class ContactSearch:
         forces = self.increment.system.backend.tables.plain.forces
         return found if nothing_touches(forces, found.u) else self.solve(found, False, most)
 
-    def _released(self, flags):
-        """Rough, on soft obstacles, from points that are bound."""
-        contacts = self.contacts
-        with bound(contacts, flags):
+    def _released(self):
+        """Rough, on soft obstacles, from points near them that are bound."""
+        contacts, (u, t), flags, near, pressed = self.contacts, self.start, [], 0.0, 0.0
+        if not is_clear(contacts.tables.clear, u,
+                        NEAR * max(group.height for _, group in contacts.groups)):
+            for (_, group), _, gap in contacts.look(u, t):
+                flags.append(gap < NEAR * group.height)
+                whole = group.areas.sum()
+                near = max(near, group.areas[flags[-1]].sum() / whole)
+                pressed = max(pressed, group.areas[gap < 0.0].sum() / whole)
+        if near <= max(PART, 2.0 * pressed):
+            raise LoadStepFailed("few points are near an obstacle, or most of them are pressed")
+        memory, before = self._memory, self._memory.copy()
+        try:  # bound to obstacles, without friction
+            memory[ANCHORED], memory[BILATERAL] = 0.0, 1.0
+            for (_, group), pair, flag in zip(contacts.groups, contacts.tables.pairs, flags):
+                far = FAR * group.height * stiffness_factor(pair)
+                pair.multipliers[:], pair.largest[0] = far * flag, far
             found = self.solve(None, True)
-        contacts.stiffen(releasing_stiffening(contacts, found.u, self.t), *self.start)
+        finally:
+            memory[:] = before
+        # all points stay in contact on obstacles so soft that the mean penetration is a tenth of
+        # the height
+        wanted = contacts.stiffening.copy()
+        for k, ((_, group), _, gap) in enumerate(contacts.look(found.u, self.t)):
+            deep = np.maximum(-gap, 0.0)
+            if np.any(deep):
+                mean = group.areas @ deep / group.areas[deep > 0.0].sum()
+                most = max(1.0, group.largest_factor / LARGEST_FACTOR)
+                wanted[k] = min(most, (1.0 + wanted[k]) * mean / (0.1 * group.height)) - 1.0
+        contacts.stiffen(wanted, *self.start)
         if contacts.anchored:
             with contacts.without_friction():
                 found = self.solve(found, True)
@@ -456,8 +357,22 @@ class ContactSearch:
             if any(group.largest_factor > 1.0 for _, group in contacts.groups):
                 yields = contacts.yielding(u, t, response(system, u, increment.load, t,
                                                           found.multipliers))
-            wanted = required_stiffening(contacts, u, t, system.strain_energy(u, t), yields)
-            if np.all(wanted == contacts.stiffening):
+            # at least the present stiffness; the strain energy includes that of the penetration
+            now, stored = contacts.stiffening, contacts.potential(u, t)
+            share = stored / max(system.strain_energy(u, t) - stored, 1e-300)
+            wanted = np.maximum(now, 0.0)
+            for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
+                part = (1.0 + now[k]) / (1.0 + wanted[k])  # penetration at this pressure, stiffened
+                deep, stores = -part * float(gap.min()) / group.height, part * share
+                if deep > DEEP or (deep > SEEN and stores > STORED):
+                    more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
+                    most = group.largest_factor / LARGEST_FACTOR
+                    wanted[k] = max(1.0, min(most, (1.0 + wanted[k]) * more)) - 1.0
+                if yields[k] > YIELDS:
+                    more = min(group.largest_factor,
+                               (1.0 + now[k]) * yields[k] / (LEFT * YIELDS))
+                    wanted[k] = max(wanted[k], more - 1.0)
+            if np.all(wanted == now):
                 break
             found, done, rough = self._to(wanted, found, rough)
             if not done:
@@ -483,3 +398,90 @@ class ContactSearch:
             rough = not last
             if last:
                 return found, True, False
+
+
+# equilibria in which nothing touches
+
+# Corrections of Newton's method lead far beyond an equilibrium, and to know on the way of each that
+# nothing touches takes longer than to find it. A scene is therefore solved without contact first.
+# That holds if a motion to the result is known on which nothing touches.
+#
+# A straight line in the degrees of freedom would shorten what turns far. In the motion each node
+# turns by its part of the whole, with its slopes, and chords between nodes by the mean of both
+# ends.
+
+#: Largest rotation of a node between two displacements of a motion, in radians, and their number.
+TURN, MOST = 1.0, 40
+
+
+def solved_without_contact(system: System, u: Array, memory: Array | None,
+                           solve: Callable[[System], StaticResult], cut: bool = False
+                           ) -> StaticResult | None:
+    """The result of ``solve`` for the scene without contact of members, if it is known that they do
+    not touch from u (N,) to there; else None, or LoadStepFailed if a failure is to ``cut`` the
+    increment."""
+    free = system.without_contact
+    if free is None or system.constraints.missing_supports:
+        return None
+    here = system.recycled(memory, 0.0)
+    try:
+        if not (here.starts_untouched and not u.any() or here.backend.of(motion_is_clear)(u[None])):
+            return None
+        result = solve(free if system.clock is None else free.at(system.clock))
+        motion, run = motion_between(here, u, result.u), here.backend.of(motion_is_clear)
+        if motion is None:
+            return None
+        if len(motion) < 3:
+            return result if run(motion) else None
+        far = np.all([e.broad_search.discs.stay_apart(motion.view(complex)[:, at[::2] // 2])
+                      for e, at in here.forces.changing], axis=0)
+        clear = all(far[k] or run(motion[k:k + 2]) for k in range(len(far)))
+        return result if clear else None
+    except (LoadStepFailed, ConvergenceError) as failure:
+        if cut and isinstance(failure, LoadStepFailed):
+            raise
+        logger.debug("without contact: %s", failure)
+        return None
+    finally:
+        here.recycle()
+
+
+def motion_between(system: System, u0: Array, u1: Array) -> Array | None:
+    """Displacements (n, N) of a motion of shapes from u0 to u1; None if anything turns far but a
+    beam of one chain, or this many times."""
+    # Fixed and joined nodes go straight, so that joints of places hold.
+    beams = list(zip(system.beams, system.slices))
+    turns: list[Array] = []  # of the nodes of chains, the least where they move least
+    for beam, s in beams:
+        turn = tangents(beam, u1[s]) * tangents(beam, u0[s]).conj()
+        turn = np.cumsum(np.angle(np.append(turn[:1], turn[1:] * turn[:-1].conj())))
+        base = np.abs((u1[s] - u0[s]).view(complex)[::beam.nd // 2]).argmin()
+        turns.append(turn - 2.0 * np.pi * np.rint(turn[base] / (2.0 * np.pi)))
+    most = max([0.0, *(np.abs(turn).max() for turn in turns)])
+    n = max(1, int(np.ceil(most / TURN)))
+    if n > MOST or n > 1 and not all(beam.mesh.is_chain for beam, _ in beams) or any(
+            np.hypot(*(u1 - u0)[system.of(body)][2:]) > TURN for body in system.bodies):
+        return None
+    share = np.linspace(0.0, 1.0, n + 1)[:, None]
+    out = u0 + share * (u1 - u0)
+    if n == 1:
+        return out
+    held, share = ~system.constraints.free, share[1:-1]
+    held[system.constraints.slopes[1]] = True
+    for (beam, s), turn in zip(beams, turns):
+        a, b = ((beam.q0 + u[s]).view(complex).reshape(-1, beam.nd // 2) for u in (u0, u1))
+        z, x, y = _evenly(a, b, turn[:, None], share[..., None]), a[:, 0], b[:, 0]
+        at = np.flatnonzero(held[s].reshape(-1, beam.nd)[:, :2].any(axis=1))
+        if not len(at):
+            at = np.array([np.abs(y - x).argmin()])
+        z[:, 1:, 0] = z[:, :1, 0] + np.cumsum(_evenly(
+            np.diff(x), np.diff(y), 0.5 * (turn[1:] + turn[:-1]), share), axis=1)
+        lost = x[at] + share * (y - x)[at] - z[:, at, 0]
+        z[:, :, 0] += [np.interp(np.arange(len(x)), at, d) for d in lost]
+        out[1:-1, s] = z.reshape(len(share), -1).view(float) - beam.q0
+    return out
+
+
+def _evenly(x, y, turn, share):
+    """Vectors between x and y that turn evenly."""
+    return np.exp(1j * share * turn) * (x + share * (y * np.exp(-1j * turn) - x))
