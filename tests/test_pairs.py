@@ -492,7 +492,9 @@ def test_nothing_touches_within_the_margin(element):
         for way in ways:
             u = margin * way.view(float)
             assert is_clear(table, 0.999 * u, 0.0) and not is_clear(table, 1.001 * u, 0.0)
-            least = forces._least_gap(0.999 * u) if table is forces.clear else min(
+            least = min(
+                element.least_gap(0.999 * u[at].reshape(-1, 2)) for element, at in forces.changing
+            ) if table is forces.clear else min(
                 gap.min() for _, _, gap in forces.contacts.look(0.999 * u, 0.0))
             assert least > 0.0
 

@@ -191,10 +191,6 @@ class ElasticElement(ForceElement):
         return (float(coordinates(kinds, y)[0]),
                 mean_slopes(kinds, y, y).reshape(2, 2)[:len(x)])
 
-    def mean_slope(self, x: Array, y: Array) -> Array:
-        """G (n, 2) with ``G . (y - x) = q(y) - q(x)``."""
-        return mean_slopes(*self._alone(x, y)).reshape(2, 2)[:len(x)]
-
     def parts(self) -> list[KernelElement] | None:
         return None if isinstance(self.k, Law) or isinstance(self.damping, Law) else [self._part]
 
@@ -202,11 +198,6 @@ class ElasticElement(ForceElement):
         """Tension or moment."""
         q, g = self.coordinate(x)
         return float(self.k(q) + self.damping(float(np.sum(g * v))))
-
-    def rate(self, x: Array) -> Array:
-        """Derivative of the amount at rest by the links, (n, 2)."""
-        q, g = self.coordinate(x)
-        return self.k.slope(q, self._scale) * g
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         return -self.amount(x, v) * self.coordinate(x)[1]
@@ -216,7 +207,7 @@ class ElasticElement(ForceElement):
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         mean = self.k.mean(self.coordinate(x)[0], self.coordinate(y)[0])
-        return -mean * self.mean_slope(x, y)
+        return -mean * mean_slopes(*self._alone(x, y)).reshape(2, 2)[:len(x)]
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         (q, g), (kinds, y) = self.coordinate(x), self._alone(x)
@@ -363,7 +354,9 @@ def spring_force(elements: Sequence[ForceElement], which: Any, u: Array, v: Arra
     if base is None or not np.any(at(base)[0]):
         return spring.amount(x, np.array([link(v) - link.start for link in spring.links]))
     start = at(base)
-    return spring.amount(start, 0.0 * start) + float(np.sum(spring.rate(start) * (x - start)))
+    q, slope = spring.coordinate(start)
+    return spring.amount(start, 0.0 * start) + spring.k.slope(q, spring._scale) * float(
+        np.sum(slope * (x - start)))
 
 
 class Foundation(ForceElement):

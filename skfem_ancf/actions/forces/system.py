@@ -1,6 +1,6 @@
 """The force elements of a scene: tables of known kinds, and user-defined elements."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from copy import copy
 from typing import Any
 
@@ -15,8 +15,8 @@ from .base import KernelElement
 from .springs import TorsionalSpring
 from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
-                      RESISTING, SETTLED, TORSION, TURNED, ForceTables, Rested, element_stiffness,
-                      kinds_of, of_kinds, potential, rests, vectors_of)
+                      RESISTING, SETTLED, TORSION, TURNED, ForceTables, Rested, coordinates,
+                      element_stiffness, kinds_of, of_kinds, rests, vectors_of)
 
 
 #: Relative size of forces of an item that are round-off.
@@ -103,7 +103,10 @@ class Forces:
         self._pair()
         self.clear, self.rested, u = clear_table(weights), nowhere(N), np.zeros(N)
         if self.changing:
-            set_clear(self.clear, u, 0.5 * SAFE * self._least_gap(u))
+            # of those that do not tell their gap none is known
+            gaps = [e.least_gap(u[at].reshape(-1, 2)) if hasattr(e, "least_gap") else 0.0
+                    for e, at in self.changing]
+            set_clear(self.clear, u, 0.5 * SAFE * min(gaps))
             self.clear[SEARCHED] = sum(pair.found[1] for pair in self.pairs)
         self.couples_far = bool(len(self.border_rows) or self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
@@ -239,17 +242,14 @@ class Forces:
 
     # values
 
-    def vectors(self, tables: ForceTables, u: Array) -> Array:
-        """Values of the vectors at u."""
-        y = np.empty(self.rows)
-        vectors_of(tables, u, 1.0, y)
-        return y
-
     def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
         """Potential of all elements; zero for those without one."""
-        y = self.vectors(tables, u)
+        y, p = np.empty(self.rows), tables.numbers.reshape(NUMBERS, -1)
+        vectors_of(tables, u, 1.0, y)
+        q = coordinates(kinds_of(tables), y)
         self.recall()
-        return potential(tables, y) + self.contacts.potential(u, t) + sum(
+        return float(0.5 * np.sum(p[0] * q**2 * (1.0 - p[4] * (q < 0.0)))) + (
+            self.contacts.potential(u, t)) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.custom, self._slices)) + (
             0.0 if self._at_rest(u) else sum(
@@ -273,8 +273,9 @@ class Forces:
 
     def part_forces(self, tables: ForceTables, u: Array, v: Array) -> Array:
         """Resisting force on the first vector of each part, shape (2, parts)."""
-        n, y, w, out = len(self.parts), self.vectors(tables, u), np.empty(self.rows), np.zeros(
+        n, y, w, out = len(self.parts), np.empty(self.rows), np.empty(self.rows), np.zeros(
             (2, self.rows))
+        vectors_of(tables, u, 1.0, y)
         vectors_of(tables, v, 0.0, w)
         if n:
             kinds = kinds_of(tables)
@@ -294,12 +295,6 @@ class Forces:
         """Tell the torsional springs the angles of the history data."""
         for spring, angle in zip(self._springs, self.contacts.turns):
             spring._last = float(angle)
-
-    def _angles(self, u: Array) -> Array:
-        """Angles of torsional springs at u, less than half a turn from the last ones; (k,)."""
-        self.recall()
-        return np.array([one.coordinate(np.array([link(u) for link in one.links]))[0]
-                         for one in self._springs])
 
     def settle(self, u0: Array, u: Array, t: float) -> float:
         """Update the history data at the end of an increment from u0 to u; returns lost work."""
@@ -326,8 +321,10 @@ class Forces:
         return take_over(self.contacts, other.contacts, u, t) or bool(items or springs)
 
     def follow(self, u: Array) -> None:
-        """Keep the angles of torsional springs at u."""
-        self.contacts.turns[:] = self._angles(u)
+        """Keep the angles of torsional springs at u, less than half a turn from the last ones."""
+        self.recall()
+        self.contacts.turns[:] = [one.coordinate(np.array([link(u) for link in one.links]))[0]
+                                  for one in self._springs]
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
@@ -401,41 +398,25 @@ class Forces:
         moved = np.max(weights * np.abs(np.diff(u, axis=0).view(complex)), axis=2).sum(axis=0)
         return moved >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 
-    def looks(self, u: Array, t: float, start: Array | None) -> Iterator[tuple[Any, Any]]:
-        """Elements of bodies that touch each other, with what their ``look`` returns."""
-        for element, at in self.changing:
-            if hasattr(element, "look"):
-                before = None if start is None else start[at].reshape(-1, 2)
-                yield element, element.look(u[at].reshape(-1, 2), t, element.history, before)
-
-    def _of_pattern(self, what, t, factor, u, w, out):
-        """Evaluate changing elements at displacements, for :meth:`add_custom`."""
-        if what == ENTRIES:
-            i, j, values = self.changing_entries(t, u, u if np.array_equal(u, w) else w)
-            self.kept, self.clear[HAS_ENTRIES] = (i, j, factor * values), float(len(i) > 0)
-            return
-        if what == ALONG_PUSHING:
-            i, j, values = self.changing_entries(t, u, u)
-            out[0] += values @ (w[i] * w[j])
-        for element, at in self.changing:
-            x, y = (z[at].reshape(-1, 2) for z in (u, w))
-            if what == ALONG_PUSHING:
-                out[1] = max(out[1], element.search_intervals(x, x + y))
-            elif not hasattr(element, "broad_search"):
-                out[at] -= np.ravel(element.force(x, 0.0 * x, t))
-
-    def _least_gap(self, u):
-        """The least gap of changing elements; 0 for unknown."""
-        return min(element.least_gap(u[at].reshape(-1, 2)) if hasattr(element, "least_gap") else 0.0
-                   for element, at in self.changing)
-
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
         """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.call_custom`."""
         # a and b are positions or, for SETTLED, a step's start and its end with velocities; from
-        # PUSHING on displacements (N,), see :meth:`_of_pattern`
+        # PUSHING on displacements (N,), of elements with a pattern that changes alone
+        if what == ENTRIES:
+            i, j, values = self.changing_entries(t, a, a if np.array_equal(a, b) else b)
+            self.kept, self.clear[HAS_ENTRIES] = (i, j, factor * values), float(len(i) > 0)
+            return
+        if what == ALONG_PUSHING:
+            i, j, values = self.changing_entries(t, a, a)
+            out[0] += values @ (b[i] * b[j])
         if what >= PUSHING:
-            self._of_pattern(what, t, factor, a, b, out)
+            for element, at in self.changing:
+                x, y = (u[at].reshape(-1, 2) for u in (a, b))
+                if what == ALONG_PUSHING:
+                    out[1] = max(out[1], element.search_intervals(x, x + y))
+                elif not hasattr(element, "broad_search"):
+                    out[at] -= np.ravel(element.force(x, 0.0 * x, t))
             return
         self.recall()
         for element, (rows, places) in zip(self.custom, self._slices):

@@ -154,10 +154,12 @@ def _of_obstacles(state, start, span, known, member):
 
 def _of_bodies(state, forces, start, known, member):
     """The same of bodies that touch each other, on both sides."""
-    for element, found in forces.looks(np.array(state.u), state._time, start):
-        if not any(element.same(other) for other in known):
+    for element, at in forces.changing:
+        if not hasattr(element, "look") or not any(element.same(other) for other in known):
             continue
-        x, y, force, pressure, gap, sticks, own, other = found
+        x, y, force, pressure, gap, sticks, own, other = element.look(
+            np.array(state.u)[at].reshape(-1, 2), state._time, element.history,
+            None if start is None else start[at].reshape(-1, 2))
         both = [np.append(x, y, axis=1), np.append(force, -force, axis=1),
                 *(np.tile(value, 2) for value in (pressure, gap, sticks))]
         here = np.ones(2 * len(gap), bool) if member is None else np.append(own, other) == member
