@@ -127,7 +127,8 @@ class Contacts:
         start = group.starts[:2].reshape(2, n, m).mean(axis=2)
         middles = np.concatenate([start, np.stack([mean, spread], axis=1).reshape(-1, n)])
         return Pair(
-            k, self.obstacles[k].shape.kind, self.numbers(k), varies, handle,
+            k, self.obstacles[k].shape.kind, self.obstacles[k].shape.numbers_about(self.origin),
+            varies, handle,
             poses[k * POSES:(k + 1) * POSES].reshape(3, POSE),
             np.ascontiguousarray(group.first // 2 + pairs, dtype=np.int64),
             *map(np.ascontiguousarray, (group.weights, group.slopes, group.areas, group.offsets,
@@ -156,10 +157,6 @@ class Contacts:
             out = np.maximum(out, weights_of_motion(
                 a.T, group.first[:, None] // 2 + pairs, N // 2, pairs % (len(a) // 2) == 0))
         return clear_table(out, BEYOND * max(group.law.radius for _, group in self.groups))
-
-    def numbers(self, k: int) -> Array:
-        """Parameters of the shape of obstacle k, relative to the origin."""
-        return self.obstacles[k].shape.numbers_about(self.origin)
 
     def pose(self, k: int, t: float, rates: bool = True) -> Array:
         """Pose of obstacle k, with its pivot relative to the origin; shape (10,)."""

@@ -63,7 +63,7 @@ class _Path:
     def __init__(self, contacts, k):
         self._contacts, (self._which, self._group) = contacts, contacts.groups[k]
         self.obstacle = contacts.obstacles[self._which]
-        self._numbers, group = contacts.numbers(self._which), self._group
+        self._numbers, group = self.obstacle.shape.numbers_about(contacts.origin), self._group
         self._dofs = group.first[::group.points, None] + np.arange(2 * len(group.weights))
         self._weights = [w.reshape(len(w), group.elements, -1).transpose(1, 0, 2)
                          for w in (group.weights, group.slopes) if len(w)]

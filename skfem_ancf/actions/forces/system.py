@@ -48,14 +48,6 @@ class Forces:
     _in_border = NONE > 0
     border_entries = _entries
     _border: Any = NONE, NONE
-    #: Of a scene without elements.
-    masses: Any = ()
-    elements = custom = changing = remembering = parts = _springs = _blocks = _slices = masses
-    _paired: Any = masses
-    rows = size = paired = 0
-    couples_far = resists = False
-    symmetric = True
-    contacts = Contacts((), 0)
     #: Entries of the last tangent of a step: rows, columns and values. Those of the last tangent of
     #: changing elements, and what they were computed from.
     kept: Any = NONE, NONE, np.zeros(0)
@@ -64,12 +56,9 @@ class Forces:
     def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
         self._N, self._bandwidth, self.border_rows = N, bandwidth, np.zeros((0, N))
-        if not elements:
-            self.clear, self.rested = np.zeros(SEEN + 2 * N), nowhere(N)
-            return
-        self.masses = [e for e in elements if e.mass_entries() is not None]
-        self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
-                         for e in elements]
+        self.masses: Any = [e for e in elements if e.mass_entries() is not None]
+        self.elements: Any = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
+                              for e in elements]
         self._sort()
         n = len(self.parts)
         # of each element its links, the rows of their components in the vectors (those of the parts
@@ -78,9 +67,9 @@ class Forces:
         for k, part in enumerate(self.parts):
             a, b = np.divmod(np.arange(16), 4) if part.kind == TORSION else FIRST
             blocks.append(((part.d, part.e), k + n * np.arange(4), a, b, k + n * (4 * a + b)))
-        self._blocks = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
+        self._blocks: list[Any] = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
         row, at = 4 * n, 16 * n
-        self._slices = []
+        self._slices = list[Any]()
         for element in self.custom:
             m = 2 * len(element.links)
             dense = element.entries is None
@@ -121,7 +110,7 @@ class Forces:
     def _sort(self):
         """Sort elements into parts that the kernels know, by kind, and the user's, by pattern."""
         parts: list[KernelElement] = []
-        self.custom, self.changing, self.remembering = [], [], []
+        self.custom, self.changing, self.remembering = list[Any](), list[Any](), list[Any]()
         for element in self.elements:
             found = element.parts()
             if found is not None:

@@ -212,7 +212,11 @@ class Obstacle(ForceElement):
             wanted = np.ceil(apart / min(np.sqrt(8.0 * SINK * bend * beam.mesh.height),
                                          RIPPLE * bend))
             pieces = int(np.clip(wanted, 1, MOST // len(rule[0])))
-            rule, apart = _repeated(*rule, pieces), apart / pieces
+            (x, w), apart = rule, apart / pieces
+            places = np.add.outer(np.arange(pieces), x)[:, :-1].ravel() / pieces
+            weights = np.tile(w[:-1], pieces) / pieces
+            weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet
+            rule = np.append(places, 1.0), np.append(weights, w[-1] / pieces)
         if apart > 2.0 * bend > 0.0:
             warn(
                 f"{self!r} has a radius of {bend:.4g}, and the points of {beam!r} that touch it "
@@ -273,11 +277,3 @@ def lobatto(n: int) -> tuple[Array, Array]:
     x = gauss_lobatto(n)
     P = np.polynomial.legendre.Legendre.basis(n - 1)(x)
     return 0.5 * (x + 1.0), 1.0 / (n * (n - 1) * P**2)
-
-
-def _repeated(x, w, pieces):
-    """A rule with end points, repeated on equal intervals of [0, 1]."""
-    points = np.add.outer(np.arange(pieces), x)[:, :-1].ravel() / pieces
-    weights = np.tile(w[:-1], pieces) / pieces
-    weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet
-    return np.append(points, 1.0), np.append(weights, w[-1] / pieces)

@@ -26,14 +26,6 @@ def circle(center: Array, radius: float, n: int) -> tuple[Array, Array]:
     return points, np.column_stack([k, np.roll(k, -1)])
 
 
-def clipped(point: Array, normal: Array, box: Array) -> tuple[Array, Array]:
-    """A line as one segment near a box."""
-    along = np.array([normal[1], -normal[0]])
-    middle, half = box.mean(axis=1), 0.5 * np.hypot(*(box[:, 1] - box[:, 0]))
-    foot = point + ((middle - point) @ along) * along
-    return np.array([foot - half * along, foot + half * along]).T, np.array([[0, 1]])
-
-
 def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Array]:
     """Zero contour of a distance function, by marching triangles on a grid."""
     x, y = (np.linspace(low, high, CELLS + 1) for low, high in box)
@@ -188,7 +180,12 @@ class Line(Outline):
         self.numbers = np.array([0.0, -FAR, FAR, *self.point, -q, p, 1.0])
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        return clipped(self.point, self._unit, box)
+        # one segment near the box
+        p, q = self._unit
+        along, middle, half = np.array([q, -p]), box.mean(axis=1), 0.5 * np.hypot(
+            *(box[:, 1] - box[:, 0]))
+        foot = self.point + ((middle - self.point) @ along) * along
+        return np.array([foot - half * along, foot + half * along]).T, np.array([[0, 1]])
 
     def __repr__(self) -> str:
         return f"<Line at {_pair(self.point)}, normal {_pair(self.normal)}>"
@@ -281,7 +278,15 @@ class Polygon(Outline):
         sides = np.where(_cross(before, edges) >= 0.0, 1.0, -1.0)
         self.numbers = np.append([self.radius, 0.0, 1.0], np.column_stack([corners, edges, sides]))
         side = -1.0 if self.hollow else 1.0
-        inner = _thin(corners, edges, side) + side * self.radius
+        # half the least distance through the solid from the middle of an edge to another edge
+        middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
+        apart = corners[None] - middle[:, None]  # corner_j + b edge_j = middle_i + a normal_i
+        det = _cross(normal[:, None], edges[None])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            a, b = _cross(apart, edges[None]) / det, _cross(apart, normal[:, None]) / det
+        met = (a > 1e-9) & (b >= 0.0) & (b <= 1.0)
+        inner = side * self.radius + 0.5 * float(np.min(np.where(
+            met, a * np.hypot(*normal.T)[:, None], np.inf)))
         self.inner = inner if inner > 0.0 else np.inf
 
     def landmarks(self) -> Array:
@@ -301,17 +306,6 @@ class Polygon(Outline):
 
 def _pair(x):
     return f"({x[0]:g}, {x[1]:g})"
-
-
-def _thin(corners, edges, side):
-    """Half the least distance through the solid from the middle of an edge to another edge."""
-    middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
-    apart = corners[None] - middle[:, None]  # corner_j + b edge_j = middle_i + a normal_i
-    det = _cross(normal[:, None], edges[None])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a, b = _cross(apart, edges[None]) / det, _cross(apart, normal[:, None]) / det
-    met = (a > 1e-9) & (b >= 0.0) & (b <= 1.0)
-    return 0.5 * float(np.min(np.where(met, a * np.hypot(*normal.T)[:, None], np.inf)))
 
 
 def _cross(a, b):

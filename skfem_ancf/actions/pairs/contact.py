@@ -117,7 +117,13 @@ class BodyContact(ForceElement):
         beams = [k for k in used if isinstance(layout.members[k], Beam)]
         self._compiled = all(layout.members[k].compiled for k in beams)
         origin = complex(*np.mean([layout.members[k].origin for k in used], axis=0))
-        f = _widened(facets_of(layout, used, origin), beams)
+        f = facets_of(layout, used, origin)
+        # areas on bodies and domains are those of the mean width of beams
+        of_beams = np.isin(f.members, beams)
+        faces = of_beams & (f.spans > 0.0)
+        if faces.any():
+            width = np.sum(f.areas[faces[f.of]]) / np.sum(f.lengths[faces])
+            f = f._replace(areas=f.areas * np.where(of_beams[f.of], 1.0, width))
         self.dofs = np.unique(f.dofs)
         sharp = f._replace(dofs=np.searchsorted(self.dofs, f.dofs))
         f = rounded(sharp, ROUND * float(np.min(f.heights)))
@@ -125,7 +131,8 @@ class BodyContact(ForceElement):
         if not np.isfinite(f.stiffness).any() and self.penalty is None:
             raise InputError(f"{self!r} has no beam, whose modulus would give a stiffness: give "
                              "stiffness=, a pressure per penetration")
-        solids = [(k, _inside(layout.members[k], origin)) for k in used if k not in beams]
+        solids = [(k, lambda x, member=layout.members[k]: member.contains(_plane(x + origin)))
+                  for k in used if k not in beams]
         places = np.isin(self.dofs, np.concatenate([layout.offset(k) // 2 + np.flatnonzero(
             layout.members[k].rigid_motions()[::2, 0]) for k in used]))
         self.broad_search = Search(surfaces, sharp, allowed, solids,
@@ -361,18 +368,3 @@ def _numbers(layout, which):
         return [layout.number(k) for k in (which if isinstance(which, (list, tuple)) else [which])]
     except NameUnknown as error:
         raise NameUnknown(error.kind, error.name, ("all", *error.known)) from None
-
-
-def _widened(facets, beams):
-    """Facets whose areas on bodies and domains are those of the mean width of beams."""
-    f = facets
-    of_beams = np.isin(f.members, beams)
-    faces = of_beams & (f.spans > 0.0)
-    if not faces.any():
-        return f
-    width = np.sum(f.areas[faces[f.of]]) / np.sum(f.lengths[faces])
-    return f._replace(areas=f.areas * np.where(of_beams[f.of], 1.0, width))
-
-
-def _inside(member, origin):
-    return lambda x: member.contains(_plane(x + origin))

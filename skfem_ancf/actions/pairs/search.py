@@ -16,7 +16,6 @@ from ..contact.stretches import Cut
 from ..contact.tables import weights_of_motion
 from .facets import Facets
 from .stretches import packed, stretches_of
-from .sweep import Discs
 
 #: Distance of seeds along facets, largest number on a facet; distances in heights for which a list
 #: of candidates is enough that are tried where nothing is near.
@@ -32,14 +31,6 @@ PARALLEL = 1e-6
 BETWEEN = 1.1
 #: Parts of an element in which crossing axes are searched.
 COARSE = 2
-
-
-def powers(zeta: Array, n: int, order: int) -> Array:
-    """A derivative of the powers 0 to n - 1 of zeta, (len(zeta), n)."""
-    out = np.zeros((len(zeta), n))
-    for k in range(order, n):
-        out[:, k] = zeta ** (k - order) * perm(k, order)
-    return out
 
 
 def displaced(curve: tuple[Array, Array], dofs: Array, z: Array) -> Array:
@@ -59,7 +50,9 @@ class Surfaces:
 
     def curve(self, e: Array, zeta: Array, order: int) -> tuple[Array, Array]:
         """Weights (n, B) and constant part (n,) of a derivative of facets by zeta."""
-        V = powers(zeta, self.facets.starts.shape[1], order)
+        V = np.zeros((len(zeta), self.facets.starts.shape[1]))  # the derivative of its powers
+        for k in range(order, V.shape[1]):
+            V[:, k] = zeta ** (k - order) * perm(k, order)
         return (np.einsum("nbk,nk->nb", self.facets.weights[e], V),
                 np.einsum("nk,nk->n", self.facets.starts[e], V))
 
@@ -76,6 +69,65 @@ class Surfaces:
         r, t = (displaced(curve, self.dofs, z) for curve in self.points)
         n = 1j * t / np.abs(t)
         return r + self.shift * n, self.facets.sides[self.facets.of] * n
+
+
+#: Largest number of parts of a chain, and of all but for one of each; largest turn of a part of a
+#: beam that cannot touch itself, in radians, and its least stretch.
+PARTS, ALL, ARC, LEAST = 32, 500, 1.4, 0.85
+
+
+class Discs:
+    """Discs around parts of chains, of several facets each; ``allowed`` (M, M) says which members
+    may touch."""
+
+    def __init__(self, t: PairTables, allowed: Array) -> None:
+        order = np.lexsort((t.places, t.chains))
+        chains, members, spans = t.chains[order], t.members[order], t.spans[order]
+        sizes = np.unique(chains, return_counts=True)[1]
+        most = max(1, min(PARTS, ALL // len(sizes)))
+        share = np.concatenate([np.arange(n) * min(n, most) // n for n in sizes])
+        first = np.flatnonzero(np.diff(chains * PARTS + share, prepend=-1))
+        self._first, self._last = first, np.append(first[1:], len(order))
+        self._sizes = self._last - first
+        self._of, self._tables = np.repeat(np.arange(len(first)), self._sizes), (
+            t.dofs[:, order], np.ascontiguousarray(t.weights[:, :, order]), t.starts[:, order],
+            t.offsets[order], 0.5 * LEAST * spans)
+        i, j = np.triu_indices(len(first))
+        some = allowed[members[first[i]], members[first[j]]]
+        self._pairs = i, j = i[some], j[some]
+        self._own = np.flatnonzero(chains[first[i]] == chains[first[j]])
+        self._faces = np.flatnonzero((t.sides[order] < 0.0) & (spans > 0.0))
+        self._follows = np.diff(chains[self._faces], prepend=-1) == 0
+
+    def stay_apart(self, z: Array) -> Array:
+        """True for straight ways between displacements (n + 1, N) on which no discs meet, but those
+        of a beam that is bent too little between them, (n,)."""
+        dofs, weights, c, offsets, least = self._tables
+        for w, at in zip(weights, dofs):
+            c = c + w * z[:, None, at]
+        middle = np.add.reduceat(c[:, 0], self._first, axis=1) / self._sizes
+        size = np.abs(c)
+        radius = np.maximum.reduceat(np.max(np.abs(c[:, 0] - middle[:, self._of]) + size[
+            :, 1:].sum(axis=1), axis=0) + offsets, self._first)
+        (i, j), far = self._pairs, np.ones(len(self._pairs[0]), bool)
+        # Parts of a chain between which it turns by less than ARC cannot touch each other, see
+        # :mod:`skfem_ancf.actions.contact.stretches`.
+        slope, turned = c[:, 1, self._faces], np.zeros((len(c), c.shape[2] + 1))
+        more = np.tensordot(size[:, 2:, self._faces], np.arange(2, c.shape[1]), (1, 0))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            within = 2.0 * np.arcsin(more / size[:, 1, self._faces])
+        turned[:, 1 + self._faces[1:]] = self._follows[1:] * np.abs(np.angle(
+            slope[:, 1:] * slope[:, :-1].conj()))
+        turned = np.cumsum(turned, axis=1)
+        turn = turned[:, self._last[j[self._own]]] - turned[:, self._first[i[self._own]] + 1]
+        most = ARC - np.max(within, axis=1, initial=0.0)
+        most[np.any(size[:, 1] < least, axis=1)] = 0.0
+        far[self._own] = ~np.all(turn < most[:, None], axis=0)
+        i, j = i[far], j[far]
+        a = middle[:, i] - middle[:, j]
+        way, a = a[1:] - a[:-1], a[:-1]
+        along = np.clip(-(a * way.conj()).real / np.maximum(np.abs(way) ** 2, 1e-300), 0.0, 1.0)
+        return np.all(np.abs(a + along * way) > radius[i] + radius[j], axis=1)
 
 
 class Search:
@@ -188,11 +240,6 @@ class Search:
 
     # parts that are one body
 
-    def _along(self, e, zeta):
-        """Where points of facets are along the axis."""
-        f = self.surfaces.facets
-        return f.places[e] + 0.5 * (1.0 + zeta) * f.spans[e]
-
     def _axes(self, z, parts):
         """Ends (n, 2) of short segments of the axes of beams, their chains, places and members."""
         f = self.surfaces.facets
@@ -201,7 +248,7 @@ class Search:
         e, at = np.repeat(bottom, n), np.linspace(*f.ends[bottom].T, n).T.ravel()
         x = 0.5 * (self.surfaces.along(e, at, 0, z) + self.surfaces.along(
             np.repeat(top, n), at, 0, z)).reshape(-1, n)
-        s = self._along(e, at).reshape(-1, n)
+        s = (f.places[e] + 0.5 * (1.0 + at) * f.spans[e]).reshape(-1, n)
         e = np.repeat(bottom, parts)
         return (np.column_stack([x[:, :-1].ravel(), x[:, 1:].ravel()]), f.chains[e],
                 0.5 * (s[:, :-1] + s[:, 1:]).ravel(), f.members[e])
@@ -218,8 +265,15 @@ class Search:
         if not len(ends):
             return _thinned(out, self.height)
         i, j = self._close(axes, near)
-        met = _distance(ends[i], ends[j]) < near
-        for a, b in zip(i[met], j[met]):
+        # the least distance of two segments: where they cross, or that of an end from the other one
+        apart = np.where(crossing(ends[i], ends[j]), 0.0, np.inf)
+        for p, q in ((ends[i], ends[j]), (ends[j], ends[i])):
+            path = q[:, 1] - q[:, 0]
+            for k in (0, 1):
+                d = p[:, k] - q[:, 0]
+                share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
+                apart = np.minimum(apart, np.abs(d - share * path))
+        for a, b in zip(i[apart < near], j[apart < near]):
             out += [(chains[a], s[a], chains[b], s[b]), (chains[b], s[b], chains[a], s[a])]
         return _thinned(out, self.height)
 
@@ -303,18 +357,6 @@ def crossing(a: Array, b: Array) -> Array:
     size = np.where(np.abs(size) > PARALLEL * np.abs(u) * np.abs(v), size, np.nan)
     s, r = cross(w, v) / size, cross(w, u) / size
     return (s > 0.0) & (s < 1.0) & (r > 0.0) & (r < 1.0)
-
-
-def _distance(a, b):
-    """The least distance of segments (n, 2)."""
-    out = np.where(crossing(a, b), 0.0, np.inf)
-    for p, q in ((a, b), (b, a)):
-        path = q[:, 1] - q[:, 0]
-        for k in (0, 1):
-            d = p[:, k] - q[:, 0]
-            share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
-            out = np.minimum(out, np.abs(d - share * path))
-    return out
 
 
 def _thinned(spots, height):
