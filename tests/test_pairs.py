@@ -20,7 +20,7 @@ from skfem_ancf.actions.contact.tables import is_clear
 from skfem_ancf.actions.forces import kernels as pair_forces, system as forces_of_scene
 from skfem_ancf.actions.obstacles import Circle, Line
 from skfem_ancf.actions.pairs import search
-from skfem_ancf.actions.pairs.stretches import stretches_of
+from skfem_ancf.actions.pairs.search import stretches_of
 from skfem_ancf.beam.layout import Layout
 from skfem_ancf.scene.quasistatic import drag_of
 

@@ -26,9 +26,8 @@ SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(KINDS))
 #: Parameters of an element. All but drags have a coordinate, its stiffness and damping, two
 #: numbers, of a spring the free length, of torsion cosine and sine of the free angle, of a
 #: foundation the normal, and 1 if they act at positive coordinates only. Those of a drag are
-#: factors of the squared normal and tangential velocity. Then rows of the vectors, and of the
-#: derivatives by them. Numba compiles for each int.
-NUMBERS, VECTORS, BLOCK = map(np.int64, (5, 4, 16))
+#: factors of the squared normal and tangential velocity.
+NUMBERS = 5
 TINY = 1e-200
 TURN = 2.0 * np.pi
 #: For the layout of a band where there is none.
@@ -45,7 +44,7 @@ class Kinds(NamedTuple):
 
     number: int
     ends: I1
-    numbers: F1
+    numbers: F2
     turns: F1
 
 
@@ -63,7 +62,7 @@ class ForceTables(NamedTuple):
 
     ``start, at, of, weight`` are vectors in the reference configuration; rows, DOFs and weights of
     their derivatives, of the length ``size``. ``number, ends, numbers``: of elements of the kinds
-    above, of kinds among them, and parameters (5 n,). ``band_at, band_of, band_weight`` are
+    above, of kinds among them, and parameters (5, n). ``band_at, band_of, band_weight`` are
     positions in the band, derivatives and weights; ``row_at, row_of`` those of elements that couple
     distant DOFs. ``custom`` is the handle of user-defined elements or 0, of which ``changing``
     change their pattern; ``clear`` says where they do nothing, see
@@ -78,7 +77,7 @@ class ForceTables(NamedTuple):
     weight: F1
     number: int
     ends: I1
-    numbers: F1
+    numbers: F2
     size: int
     band_at: I1
     band_of: I1
@@ -103,21 +102,15 @@ def vectors_of(tables, u, factor, out):
 
 
 @source
-def _part(kinds, kind, rows, x):
-    """A view of the rows of one kind."""
-    return _table(kinds, rows, x)[:, kinds.ends[kind]:kinds.ends[kind + 1]]
-
-
-@source
-def _table(kinds, rows, x):
-    """A view of the rows of all kinds."""
-    return shaped(x[:rows * kinds.number], (rows, kinds.number))
+def _part(kinds, kind, x):
+    """A view of the columns of one kind."""
+    return x[:, kinds.ends[kind]:kinds.ends[kind + 1]]
 
 
 @source
 def _of(kinds, kind, y, q):
     """Parameters, vectors, and numbers (n,) of one kind."""
-    return (_part(kinds, kind, NUMBERS, kinds.numbers), _part(kinds, kind, VECTORS, y),
+    return (_part(kinds, kind, kinds.numbers), _part(kinds, kind, y),
             q[kinds.ends[kind]:kinds.ends[kind + 1]])
 
 
@@ -411,18 +404,18 @@ def put_far_stiffness(tables, D, factor, first, S):
 @apart("elements", Annotated[Kinds, MADE], int, F1, F1, float, F1)
 def of_kinds(kinds, what, y, w, factor, out):
     """Evaluate ``what`` for all kinds from vectors y, and end vectors or rates w."""
+    n, p = kinds.number, kinds.numbers
+    d, v = shaped(y[:4 * n], (4, n)), shaped(w[:4 * n], (4, n))
     if what == DERIVATIVES:
-        derivatives(kinds, y, w, factor, out)
+        derivatives(kinds, d, v, factor, shaped(out[:16 * n], (16, n)))
         return
     if what == TURNED:
-        turned(_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, VECTORS, y),
-               kinds.turns, kinds.turns)
+        turned(_part(kinds, TORSION, p), _part(kinds, TORSION, d), kinds.turns, kinds.turns)
         return
-    p, v, f = (_table(kinds, NUMBERS, kinds.numbers), _table(kinds, VECTORS, w),
-               _table(kinds, VECTORS, out))
-    q, g = coordinates(kinds, y), mean_slopes(kinds, y, w if what == ELASTIC else y)
+    f = shaped(out[:4 * n], (4, n))
+    q, g = coordinates(kinds, d), mean_slopes(kinds, d, v if what == ELASTIC else d)
     if what == ELASTIC:  # a mean between two states, which may be equal
-        r = coordinates(kinds, w)
+        r = coordinates(kinds, v)
         for e in indices(q.size):  # (V1 - V0) / (q1 - q0), V = k q^2 / 2 or zero for q < 0
             a, b = q[e] * (1.0 - p[4, e] * (q[e] < 0.0)), r[e] * (1.0 - p[4, e] * (r[e] < 0.0))
             same = np.abs(r[e] - q[e]) < TINY
@@ -438,8 +431,8 @@ def of_kinds(kinds, what, y, w, factor, out):
             f[i, e] = q[e] * g[i, e]
     if what == ELASTIC:
         return
-    p, d, v, f = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, VECTORS, y),
-                  _part(kinds, DRAG, VECTORS, w), _part(kinds, DRAG, VECTORS, out))
+    p, d = _part(kinds, DRAG, p), _part(kinds, DRAG, d)
+    v, f = _part(kinds, DRAG, v), _part(kinds, DRAG, f)
     for e in indices(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
@@ -484,18 +477,14 @@ def mean_slopes(kinds, y0, y1):
     """Means of the derivatives of coordinates by the vectors, (4, n): times the change of these
     the change of the coordinates. For equal vectors, which may be one array, the derivatives."""
     g = np.zeros((4, kinds.number))
-    flat = g.reshape(g.size)
-    a, b, f = (_part(kinds, SPRING, VECTORS, y0), _part(kinds, SPRING, VECTORS, y1),
-               _part(kinds, SPRING, VECTORS, flat))
+    a, b, f = _part(kinds, SPRING, y0), _part(kinds, SPRING, y1), _part(kinds, SPRING, g)
     for e in indices(f.shape[1]):
         c = 1.0 / (distance(a, e) + distance(b, e))
         f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
-    a, b, f = (_part(kinds, TORSION, VECTORS, y0), _part(kinds, TORSION, VECTORS, y1),
-               _part(kinds, TORSION, VECTORS, flat))
+    a, b, f = _part(kinds, TORSION, y0), _part(kinds, TORSION, y1), _part(kinds, TORSION, g)
     if f.shape[1] > 0:
         mean_turning(a, b, f)
-    p, f = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
-            _part(kinds, FOUNDATION, VECTORS, flat))
+    p, f = _part(kinds, FOUNDATION, kinds.numbers), _part(kinds, FOUNDATION, g)
     for e in indices(f.shape[1]):
         f[0, e], f[1, e] = p[2, e], p[3, e]
     return g
@@ -506,7 +495,7 @@ def add_bends(kinds, y, g, T, D):
     """Add T (n,) times the second derivatives of coordinates with derivatives g; (i, j) at 4 i + j.
     """
     _, d, c = _of(kinds, SPRING, y, T)
-    h, s = g[:, :c.size], _part(kinds, SPRING, BLOCK, D)
+    h, s = g[:, :c.size], _part(kinds, SPRING, D)
     for e in indices(c.size):
         k = c[e] / distance(d, e)
         s[0, e] += k * h[1, e] * h[1, e]
@@ -514,7 +503,7 @@ def add_bends(kinds, y, g, T, D):
         s[1, e] -= k * h[0, e] * h[1, e]
         s[4, e] -= k * h[0, e] * h[1, e]
     _, d, c = _of(kinds, TORSION, y, T)
-    s = _part(kinds, TORSION, BLOCK, D)
+    s = _part(kinds, TORSION, D)
     for k in range(2):  # that of the angle of d, and minus that of e
         for e in indices(c.size):
             x, z = d[2 * k, e], d[2 * k + 1, e]
@@ -528,7 +517,7 @@ def add_bends(kinds, y, g, T, D):
 @source
 def derivatives(kinds, y, w, factor, D):
     """Derivatives of forces, and factor times those of resisting ones by w; (i, j) at 4 i + j."""
-    p, s, c = _table(kinds, NUMBERS, kinds.numbers), _table(kinds, BLOCK, D), np.empty(kinds.number)
+    p, s, c = kinds.numbers, D, np.empty(kinds.number)
     q, g = coordinates(kinds, y), mean_slopes(kinds, y, y)
     for e in indices(q.size):
         c[e] = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * (q[e] < 0.0))
@@ -538,8 +527,8 @@ def derivatives(kinds, y, w, factor, D):
             for e in indices(q.size):
                 s[4 * i + j, e] = c[e] * g[i, e] * g[j, e]
     add_bends(kinds, y, g, q, D)
-    p, d, v, s = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, VECTORS, y),
-                  _part(kinds, DRAG, VECTORS, w), _part(kinds, DRAG, BLOCK, D))
+    p, d = _part(kinds, DRAG, kinds.numbers), _part(kinds, DRAG, y)
+    v, s = _part(kinds, DRAG, w), _part(kinds, DRAG, D)
     for e in indices(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size

@@ -35,7 +35,8 @@ class Forces:
     with places that differ by more than 1. ``symmetric``: all derivatives are symmetric.
     ``resists``: there are velocity-dependent forces. ``masses`` contribute to the mass matrix;
     ``contacts`` are the obstacles. ``clear`` and ``rested`` are tables of
-    :func:`~skfem_ancf.actions.forces.kernels.rests`.
+    :func:`~skfem_ancf.actions.forces.kernels.rests`. ``blocks`` are the numbers of the derivatives
+    of each element.
     """
 
     #: The vectors are ``start + B u``: the start, and the rows, DOFs and weights of B.
@@ -67,7 +68,7 @@ class Forces:
         for k, part in enumerate(self.parts):
             a, b = np.divmod(np.arange(16), 4) if part.kind == TORSION else FIRST
             blocks.append(((part.d, part.e), k + n * np.arange(4), a, b, k + n * (4 * a + b)))
-        self._blocks: list[Any] = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
+        self.blocks: list[Any] = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
         row, at = 4 * n, 16 * n
         self._slices = list[Any]()
         for element in self.custom:
@@ -77,7 +78,7 @@ class Forces:
                 np.arange(m * m), m) if dense else element.entries
             numbers = at + np.arange(len(a))
             if not element.changing:
-                self._blocks.append(numbers.reshape(m, m) if dense else numbers)
+                self.blocks.append(numbers.reshape(m, m) if dense else numbers)
             self._slices.append((slice(row, row + m), slice(at, at + len(a))))
             blocks.append((element.links, row + np.arange(m), a, b, numbers))
             row, at = row + m, at + len(a)
@@ -194,7 +195,7 @@ class Forces:
         return ForceTables(
             start, at, of, weight, len(self.parts),
             np.searchsorted(kinds, np.arange(KINDS + 1)).astype(np.int64),
-            np.ascontiguousarray(numbers.T).ravel(), self.size,
+            np.ascontiguousarray(numbers.T), self.size,
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._border[0], self._border[1],
             handle if self.custom or self.changing else 0, self.contacts.tables,
@@ -233,9 +234,9 @@ class Forces:
 
     def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
         """Potential of all elements; zero for those without one."""
-        y, p = np.empty(self.rows), tables.numbers.reshape(NUMBERS, -1)
+        y, p = np.empty(self.rows), tables.numbers
         vectors_of(tables, u, 1.0, y)
-        q = coordinates(kinds_of(tables), y)
+        q = coordinates(kinds_of(tables), y[:4 * tables.number].reshape(4, -1))
         self.recall()
         return float(0.5 * np.sum(p[0] * q**2 * (1.0 - p[4] * (q < 0.0)))) + (
             self.contacts.potential(u, t)) + sum(
@@ -321,11 +322,6 @@ class Forces:
         D = np.zeros(self.size)
         element_stiffness(tables, t, u, v, factor, D)
         return D
-
-    def stiffness_norms(self, tables: ForceTables, u: Array) -> Array:
-        """Largest eigenvalue of the stiffness of each element, shape (k,)."""
-        D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
-        return np.array([np.linalg.norm(D[numbers], 2) for numbers in self._blocks])
 
     def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
                 factor: float) -> tuple[Array, Array, Array]:
@@ -437,5 +433,5 @@ def nowhere(N: int) -> Rested:
 
 #: For scenes without force elements.
 NO_FORCES = constant(ForceTables(
-    _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS, 0,
-    _X, 0, _I, nowhere(0)))
+    _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), np.zeros((NUMBERS, 0)), 0, _I, _I, _X, _I,
+    _I, 0, NO_CONTACTS, 0, _X, 0, _I, nowhere(0)))
