@@ -18,9 +18,9 @@ from ...core.band import smallest
 from ...core import C1, F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
 from .gap import Placed, carried, distances, middles, outside, placed
-from .points import (RESPONSE, TOUCH, Touch, add_bend, add_coupling, add_resistance, by_slope,
-                     cross, dot, mean_pressure, pressure_slope, product, put, respond,
-                     return_mapping, scaled, spread, turned, vector)
+from .points import (TOUCH, Touch, add_bend, add_coupling, add_resistance, by_slope, cross, dot,
+                     mean_pressure, pressure_slope, product, put, respond, return_mapping, scaled,
+                     spread, turned, vector)
 from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, DAMPED_TANGENT, END,
                      FAR, FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SAFE, SETTLE, TINY,
                      ContactTables, Request, is_clear, pair_of, set_clear, stiffness_factor,
@@ -79,7 +79,11 @@ def of_pair(pair, request, u, v, out, least):
     """Add the answer of the active points of a pair; of a FORCE set also the least gap."""
     what, same, law = request.what, request.span == 0.0, pair.law
     if what == ALONG:  # the largest displacement of an element's middle
-        out[1] = max(out[1], _relative_travel(pair, v))
+        rows, square = np.empty((3, pair.middles.shape[1])), 0.0
+        middles(pair, v, 0.0, rows[:2], rows[2])
+        for e in range(rows.shape[1]):
+            square = max(square, rows[0, e] * rows[0, e] + rows[1, e] * rows[1, e])
+        out[1] = max(out[1], np.sqrt(square) / law.radius)
     resists = what == RESISTING or what == DAMPED_TANGENT
     if resists and law.damping == 0.0:
         return
@@ -127,24 +131,40 @@ def _answer(pair, request, same, touch, spot, v, out):
     n = at.size
     if what == SETTLE:
         _settle(pair, same, touch, spot, r, out)
-    elif what == FORCE:
+        return
+    if what == FORCE:
         R = np.zeros((4, n))
         add_resistance(touch, r, R)
         spread(pair.dofs, pair.weights, pair.slopes, at, R, out.view(np.complex128))
+        return
+    # first the derivatives due to directions that turn; (x, y) in row 4 x + y
+    K, half = np.zeros((16, n)), 1.0 if same else 0.5
+    for i in indices(n):
+        normal, t, offset, w = spot.normal[i], spot.slope[i], pair.offsets[at[i]], spot.away[i]
+        P, T, s = r.pressure[i], r.friction[i], half * r.spring[i]
+        xx, xy, yy = spot.bend[0, i], spot.bend[1, i], spot.bend[2, i]
+        a, b = xy * w.real - xx * w.imag, yy * w.real - xy * w.imag  # the tangent at the anchor
+        # of the surface point, then of position and slope
+        k = ((s * normal.imag * a - P * xx - T * xy, s * normal.imag * b - P * xy - T * yy),
+             (T * xx - P * xy - s * normal.real * a, T * xy - P * yy - s * normal.real * b))
+        p, q = by_slope(t, offset, vector(1.0, 0.0)), by_slope(t, offset, vector(0.0, 1.0))
+        by = (1.0, 0.0, p.real, p.imag), (0.0, 1.0, q.real, q.imag)
+        for x in range(4):
+            for y in range(4):
+                K[4 * x + y, i] = (by[0][x] * (k[0][0] * by[0][y] + k[0][1] * by[1][y])
+                                   + by[1][x] * (k[1][0] * by[0][y] + k[1][1] * by[1][y]))
+        add_bend(t, offset, scaled(-P, normal) + scaled(T, turned(normal)), i, K)
+    add_coupling(touch, r, K)
+    if what == ALONG:
+        rates, value = np.empty((4, n)), np.zeros(n)
+        set_rates(pair, v, at, rates)
+        for x in range(4):
+            for y in range(4):
+                for i in indices(n):
+                    value[i] += K[4 * x + y, i] * rates[x, i] * rates[y, i]
+        add_each(out, 0 * at, value)
     else:
-        K = np.zeros((16, n))
-        _set_curvature(pair, same, touch, spot, r, K)
-        add_coupling(touch, r, K)
-        if what == ALONG:
-            rates, value = np.empty((4, n)), np.zeros(n)
-            set_rates(pair, v, at, rates)
-            for x in range(4):
-                for y in range(4):
-                    for i in indices(n):
-                        value[i] += K[4 * x + y, i] * rates[x, i] * rates[y, i]
-            add_each(out, 0 * at, value)
-        else:
-            _add_stiffness(pair, request, at, K, out)
+        _add_stiffness(pair, request, at, K, out)
 
 
 # what may touch
@@ -194,17 +214,6 @@ def project(pair, which, u, at):
 def _selected(points, some):
     """Some of the points."""
     return Placed(points.x[some], points.t[some], points.surface[some], points.gap[some])
-
-
-@source
-def _relative_travel(pair, u):
-    """Largest displacement of an element's middle, relative to the radius of its points."""
-    n, square = pair.middles.shape[1], 0.0
-    rows = np.empty((3, n))
-    middles(pair, u, 0.0, rows[:2], rows[2])
-    for e in range(n):
-        square = max(square, rows[0, e] * rows[0, e] + rows[1, e] * rows[1, e])
-    return np.sqrt(square) / pair.law.radius
 
 
 # points in contact
@@ -289,27 +298,6 @@ def set_rates(pair, v, at, rates):
     for i in indices(at.size):
         put(rates, 0, i, x[i])
         put(rates, 1, i, t[i])
-
-
-@apart("contacts", PAIR, bool, TOUCH, SPOT, RESPONSE, F2)
-def _set_curvature(pair, same, touch, spot, r, K):
-    """Set the derivatives due to directions that turn; (x, y) in row 4 x + y."""
-    half = 1.0 if same else 0.5
-    for i in indices(touch.k.size):
-        n, t, offset, w = spot.normal[i], spot.slope[i], pair.offsets[touch.at[i]], spot.away[i]
-        P, T, s = r.pressure[i], r.friction[i], half * r.spring[i]
-        xx, xy, yy = spot.bend[0, i], spot.bend[1, i], spot.bend[2, i]
-        a, b = xy * w.real - xx * w.imag, yy * w.real - xy * w.imag  # the tangent at the anchor
-        # of the surface point, then of position and slope
-        k = ((s * n.imag * a - P * xx - T * xy, s * n.imag * b - P * xy - T * yy),
-             (T * xx - P * xy - s * n.real * a, T * xy - P * yy - s * n.real * b))
-        p, q = by_slope(t, offset, vector(1.0, 0.0)), by_slope(t, offset, vector(0.0, 1.0))
-        by = (1.0, 0.0, p.real, p.imag), (0.0, 1.0, q.real, q.imag)
-        for x in range(4):
-            for y in range(4):
-                K[4 * x + y, i] = (by[0][x] * (k[0][0] * by[0][y] + k[0][1] * by[1][y])
-                                   + by[1][x] * (k[1][0] * by[0][y] + k[1][1] * by[1][y]))
-        add_bend(t, offset, scaled(-P, n) + scaled(T, turned(n)), i, K)
 
 
 @apart("contacts", PAIR, float, TOUCH, SPOT, F2, F2, F2)

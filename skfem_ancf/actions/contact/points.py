@@ -126,7 +126,6 @@ class Response(NamedTuple):
 
 
 TOUCH: TypeAlias = Annotated[Touch, MADE]
-RESPONSE: TypeAlias = Annotated[Response, MADE]
 
 
 @source

@@ -11,7 +11,6 @@ from ...core import Array, constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SAFE, SEARCHED, SEEN, clear_table, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
-from .base import KernelElement
 from .springs import TorsionalSpring
 from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
@@ -110,7 +109,7 @@ class Forces:
 
     def _sort(self):
         """Sort elements into parts that the kernels know, by kind, and the user's, by pattern."""
-        parts: list[KernelElement] = []
+        parts = list[Any]()
         self.custom, self.changing, self.remembering = list[Any](), list[Any](), list[Any]()
         for element in self.elements:
             found = element.parts()
@@ -288,7 +287,9 @@ class Forces:
 
     def settle(self, u0: Array, u: Array, t: float) -> float:
         """Update the history data at the end of an increment from u0 to u; returns lost work."""
-        self.follow(u)
+        self.recall()  # the angles are less than half a turn from the last ones
+        self.contacts.turns[:] = [one.coordinate(np.array([link(u) for link in one.links]))[0]
+                                  for one in self._springs]
         return self.contacts.settle(u, t) + sum(
             item.settle(u0, u, t) for item in self._at_work(u0, u))
 
@@ -309,12 +310,6 @@ class Forces:
         for (k, spring), (j, one) in springs:
             turns[k] = other.contacts.turns[j] + one._start - spring._start
         return take_over(self.contacts, other.contacts, u, t) or bool(items or springs)
-
-    def follow(self, u: Array) -> None:
-        """Keep the angles of torsional springs at u, less than half a turn from the last ones."""
-        self.recall()
-        self.contacts.turns[:] = [one.coordinate(np.array([link(u) for link in one.links]))[0]
-                                  for one in self._springs]
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:

@@ -380,14 +380,10 @@ class SignedDistance(Shape):
         """Values of one of the functions, with a check of the shape."""
         more = (t,) if self._timed[name] else ()
         value = ask(f"{name} of a SignedDistance", getattr(self, name), x[0], x[1], *more)
-        value = np.asarray(value)
-        if name == "f" and value.ndim == 0 and x[0].ndim == 0:
-            pass
-        else:
-            refuse(value.shape != (*rows, *x.shape[1:]), "{}(x, y) of a SignedDistance must return "
-                   "the shape {} for x and y of the shape {}, got {}: write it for arrays, as "
-                   "np.hypot(x, y) - 1.0", name, (*rows, *x.shape[1:]), x.shape[1:], value.shape,
-                   error=CallbackError)
+        value, shape = np.asarray(value), (*rows, *x.shape[1:])
+        refuse(value.shape != shape, "{}(x, y) of a SignedDistance must return the shape {} for x "
+               "and y of the shape {}, got {}: write it for arrays, as np.hypot(x, y) - 1.0", name,
+               shape, x.shape[1:], value.shape, error=CallbackError)
         refuse(value.dtype.kind not in "fiuc" or not np.all(np.isfinite(value)), "{}(x, y) of a "
                "SignedDistance must be finite numbers, got {!r}", name, value, error=CallbackError)
         return value
@@ -399,16 +395,15 @@ class SignedDistance(Shape):
         """Gradient at points, shape (2, n)."""
         if self.gradient is not None:
             return self._asked("gradient", x, t, (2,))
-        return self._complex_steps(x, t) if self._by_steps else self._differences(x, t)
+        return self._slope_by_steps(x, t, self._by_steps)
 
-    def _complex_steps(self, x, t):
-        return np.array([np.imag(self._asked("f", x + 1e-30j * e, t)) / 1e-30
-                         for e in np.eye(2)[:, :, None]])
-
-    def _differences(self, x, t):
-        step = STEP * self._scale
+    def _slope_by_steps(self, x, t, imaginary):
+        """The same by complex steps or by differences."""
+        units, step = np.eye(2)[:, :, None], STEP * self._scale
+        if imaginary:
+            return np.array([np.imag(self._asked("f", x + 1e-30j * e, t)) / 1e-30 for e in units])
         return np.array([(self._asked("f", x + step * e, t) - self._asked("f", x - step * e, t))
-                         / (2.0 * step) for e in np.eye(2)[:, :, None]])
+                         / (2.0 * step) for e in units])
 
     def derivatives(self, x: Array, t: float) -> Array:
         """Distance, gradient and second derivatives xx, xy, yy, shape (6, n)."""
@@ -426,7 +421,7 @@ class SignedDistance(Shape):
     def fitted(self, x: Array, scale: float) -> "SignedDistance":
         made = self._thawed()
         made._scale, made._by_steps = scale, False
-        rough = made._differences(x, 0.0)
+        rough = made._slope_by_steps(x, 0.0, False)
         steep = np.hypot(*rough)
         worst = int(np.argmax(steep))
         refuse(steep[worst] > 1.0 + STEEP, "f(x, y) of a SignedDistance must be a distance, whose "
@@ -435,8 +430,8 @@ class SignedDistance(Shape):
         if made.gradient is None:
             with suppress(CallbackError, TypeError, ValueError, _COMPLEX), (
                     warnings_as_errors(_COMPLEX)):
-                made._by_steps = bool(np.allclose(made._complex_steps(x, 0.0), rough, rtol=0.0,
-                                                  atol=1e-4))
+                made._by_steps = bool(np.allclose(made._slope_by_steps(x, 0.0, True), rough,
+                                                  rtol=0.0, atol=1e-4))
         else:
             off = np.abs(made._slope(x, 0.0) - rough).max()
             refuse(off > 1e-3, "gradient(x, y) of a SignedDistance is not that of f: they differ "

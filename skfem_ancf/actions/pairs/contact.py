@@ -113,7 +113,17 @@ class BodyContact(ForceElement):
     # binding
 
     def bind(self, layout: Layout) -> list[Vector]:
-        used, allowed = self._members(layout)
+        # which members may touch, and their numbers
+        n = len(layout.members)
+        a, b = _numbers(layout, self.a), _numbers(layout, "all" if self.b is None else self.b)
+        allowed = np.zeros((n, n), bool)
+        allowed[np.ix_(a, b)] = True
+        allowed |= allowed.T
+        for k in range(n):
+            allowed[k, k] = self.self_contact and k in a and isinstance(layout.members[k], Beam)
+        refuse(not allowed.any(), "{!r} has nothing to touch: give self_contact=True for the "
+               "contact of a beam with itself, or two members, as scene.contact(0, 1)", self)
+        used = np.flatnonzero(allowed.any(axis=0)).tolist()
         beams = [k for k in used if isinstance(layout.members[k], Beam)]
         self._compiled = all(layout.members[k].compiled for k in beams)
         origin = complex(*np.mean([layout.members[k].origin for k in used], axis=0))
@@ -142,19 +152,6 @@ class BodyContact(ForceElement):
         self.near = NEAR * self.broad_search.height
         self._begin(layout)
         return [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in self.dofs]
-
-    def _members(self, layout):
-        """Numbers of the members, and which of all may touch."""
-        n = len(layout.members)
-        a, b = _numbers(layout, self.a), _numbers(layout, "all" if self.b is None else self.b)
-        allowed = np.zeros((n, n), bool)
-        allowed[np.ix_(a, b)] = True
-        allowed |= allowed.T
-        for k in range(n):
-            allowed[k, k] = self.self_contact and k in a and isinstance(layout.members[k], Beam)
-        refuse(not allowed.any(), "{!r} has nothing to touch: give self_contact=True for the "
-               "contact of a beam with itself, or two members, as scene.contact(0, 1)", self)
-        return np.flatnonzero(allowed.any(axis=0)).tolist(), allowed
 
     def _begin(self, layout):
         """Set the gaps at which the pressure begins; InputError if members overlap."""

@@ -348,20 +348,22 @@ class Search:
             inside = contains(ends.mean(axis=1)) | contains(ends[:, 0]) | contains(ends[:, 1])
             other = f.chains[np.argmax(f.members == k)]
             out += [(i, a, other, 0.0) for i, a in zip(chains[inside], s[inside])]
-        if not len(ends):
-            return _thinned(out, self.height)
-        i, j = self._close(axes, near)
-        # the least distance of two segments: where they cross, or that of an end from the other one
-        apart = np.where(crossing(ends[i], ends[j]), 0.0, np.inf)
-        for p, q in ((ends[i], ends[j]), (ends[j], ends[i])):
-            path = q[:, 1] - q[:, 0]
-            for k in (0, 1):
-                d = p[:, k] - q[:, 0]
-                share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
-                apart = np.minimum(apart, np.abs(d - share * path))
-        for a, b in zip(i[apart < near], j[apart < near]):
-            out += [(chains[a], s[a], chains[b], s[b]), (chains[b], s[b], chains[a], s[a])]
-        return _thinned(out, self.height)
+        if len(ends):
+            i, j = self._close(axes, near)
+            # the least distance of segments: 0 where they cross, or that of an end from the other
+            apart = np.where(crossing(ends[i], ends[j]), 0.0, np.inf)
+            for p, q in ((ends[i], ends[j]), (ends[j], ends[i])):
+                path = q[:, 1] - q[:, 0]
+                for k in (0, 1):
+                    d = p[:, k] - q[:, 0]
+                    share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
+                    apart = np.minimum(apart, np.abs(d - share * path))
+            for a, b in zip(i[apart < near], j[apart < near]):
+                out += [(chains[a], s[a], chains[b], s[b]), (chains[b], s[b], chains[a], s[a])]
+        # without those of nearly equal places
+        h = self.height
+        return list({(i, round(2.0 * s / h), j, round(2.0 * r / h)): (i, s, j, r)
+                     for i, s, j, r in out}.values())
 
     def _close(self, axes, near):
         """Pairs of segments of axes that may be as near, and are not parts of one body."""
@@ -443,9 +445,3 @@ def crossing(a: Array, b: Array) -> Array:
     size = np.where(np.abs(size) > PARALLEL * np.abs(u) * np.abs(v), size, np.nan)
     s, r = cross(w, v) / size, cross(w, u) / size
     return (s > 0.0) & (s < 1.0) & (r > 0.0) & (r < 1.0)
-
-
-def _thinned(spots, height):
-    """Spots without those of nearly equal places."""
-    return list({(i, round(2.0 * s / height), j, round(2.0 * r / height)): (i, s, j, r)
-                 for i, s, j, r in spots}.values())
