@@ -16,7 +16,6 @@ from ..bound import differences
 from .base import ForceElement
 from .kernels import turned
 
-KINDS = ("force", "moment")
 #: Round-off relative to the sampling time.
 ROUND_OFF = 1e-9
 
@@ -71,7 +70,7 @@ class Control(ForceElement):
         if isinstance(law, type):
             raise InputError(f"law must be a function of time and measurements, got {shown(law)}")
         self.at, self.other, self.beam = at, other, beam
-        self.kind = require_option("kind", kind, KINDS)
+        self.kind = require_option("kind", kind, ("force", "moment"))
         self.points, self.sections = _named("points", points), _named("sections", sections)
         both = {name for name, _ in self.points} & {name for name, _ in self.sections}
         refuse(both, "points and sections must have different names, got {} in both", sorted(both))

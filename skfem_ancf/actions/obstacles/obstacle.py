@@ -14,7 +14,6 @@ from ..forces.base import ForceElement, KernelElement
 from ..places import Vector
 from .shapes import Shape
 
-METHODS = ("penalty", "augmented")
 #: Least length of indentation of a strip under a point force, relative to its extent: meshes do not
 #: resolve shorter ones, and Newton's method fails.
 SPREAD = 1.0 / 200.0
@@ -104,7 +103,7 @@ class Obstacle(ForceElement):
         self.friction = require_not_negative("friction", friction, False)
         self.damping = require_not_negative("damping", damping)
         self.penalty = None if stiffness is None else require_positive("stiffness", stiffness)
-        self.method = require_option("method", method, METHODS)
+        self.method = require_option("method", method, ("penalty", "augmented"))
         self.points = None if points is None else require_integer("points", points, 2, MOST)
         self.position, self.angle = position, angle
         for name, function in (("position", position), ("angle", angle)):

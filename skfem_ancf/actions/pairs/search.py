@@ -96,7 +96,8 @@ def stretches_of(f: Facets, touch: Array, facets: Facets, moves: Array, places: 
         places, (n,).
     """
     if not touch.any():
-        return np.full(len(facets.sides), -1), NO_ROWS
+        i, c, x = np.zeros((2, 0), np.int64), np.zeros((2, 0), complex), np.zeros(0)
+        return np.full(len(facets.sides), -1), Rows(i, c, c[0], x, x, i[0], i[0], 1)
     n, own = f.starts.shape[1], touch[f.members]
     bottom, top = (np.flatnonzero(own & (f.spans > 0.0) & (f.sides == side))
                    for side in (-1, 1))
@@ -150,11 +151,6 @@ def _controls(n, C):
     rise = 0.5 + 0.5 * x
     basis = np.array([comb(n - 1, k) * rise**k * (1.0 - rise) ** (n - 1 - k) for k in range(n)]).T
     return np.moveaxis(C @ np.linalg.solve(basis, np.vander(x, n, increasing=True)).T, -1, 0)
-
-
-_I, _C = np.zeros((2, 0), np.int64), np.zeros((2, 0), complex)
-#: Of members that cannot touch themselves.
-NO_ROWS = Rows(_I, _C, _C[0], np.zeros(0), np.zeros(0), _I[0], _I[0], 1)
 
 
 #: Largest number of parts of a chain, and of all but for one of each; largest turn of a part of a
