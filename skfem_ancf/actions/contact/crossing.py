@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array
-from .gap import outline
+from .kernels import outline
 from .tables import CUSTOM, taken_back
 
 #: Largest number of samples of a path; number of points per batch.

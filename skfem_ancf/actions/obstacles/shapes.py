@@ -9,7 +9,7 @@ import numpy as np
 from ...core import (Array, ArrayLike, CallbackError, Immutable, ask, refuse, refuse_any,
                      require_direction, require_finite, require_flag, require_function,
                      require_not_negative, require_positive, warnings_as_errors)
-from ..contact.gap import outline
+from ..contact.kernels import outline
 from ..contact.tables import CUSTOM, OUTLINE
 from ..item import takes
 
