@@ -630,8 +630,8 @@ def check_contact(system, state, internal):
         normal = on.pressure.max() if len(on) else 0.0
         if friction == 0.0 and normal and np.any(on.sticking):
             raise Wrong("points stick without friction")
-    (_, found), = state._equations.forces.looks(state.u, 1.0, None)
-    check_cone(found, faces, friction)
+    (element, at), = state._equations.forces.changing
+    check_cone(element.look(state.u[at].reshape(-1, 2), 1.0, element.history), faces, friction)
 
 
 def faces_of(state):

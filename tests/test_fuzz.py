@@ -97,7 +97,8 @@ def test_friction_of_members_is_checked():
     """It is at its limit where leaves slide: a hundredth more or less is seen."""
     assert fuzz.run(SLIDING) == ("in contact", "")
     _, (state, _), _ = fuzz.solve(SLIDING, False)
-    (_, found), = state._equations.forces.looks(state.u, 1.0, None)
+    (element, at), = state._equations.forces.changing
+    found = element.look(state.u[at].reshape(-1, 2), 1.0, element.history)
     assert 0 < np.sum(found[5]) < 0.2 * len(found[5])
     faces = fuzz.faces_of(state)
     fuzz.check_cone(found, faces, 0.3)

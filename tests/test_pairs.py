@@ -22,7 +22,7 @@ from skfem_ancf.actions.contact.tables import is_clear
 from skfem_ancf.actions.forces import kernels as pair_forces, system as forces_of_scene
 from skfem_ancf.actions.obstacles import Circle, Line
 from skfem_ancf.actions.pairs import search
-from skfem_ancf.actions.pairs.stretches import stretches_of
+from skfem_ancf.actions.pairs.search import stretches_of
 from skfem_ancf.beam.layout import Layout
 from skfem_ancf.scene.quasistatic import drag_of
 
@@ -528,7 +528,9 @@ def test_nothing_touches_within_the_margin(element):
         for way in ways:
             u = margin * way.view(float)
             assert is_clear(table, 0.999 * u, 0.0) and not is_clear(table, 1.001 * u, 0.0)
-            least = forces._least_gap(0.999 * u) if table is forces.clear else min(
+            least = min(
+                element.least_gap(0.999 * u[at].reshape(-1, 2)) for element, at in forces.changing
+            ) if table is forces.clear else min(
                 gap.min() for _, _, gap in forces.contacts.look(0.999 * u, 0.0))
             assert least > 0.0
 

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..actions.forces.kernels import add_resisting_force, settle_contact, settle_elements
+from ..actions.forces.kernels import add_resisting_force, settle_forces
 from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import accept_body, add_viscous_force, body_tangent
 from ..core.band import (Band, add_multiple, clear, copy, dot, multiply, solve, solve_dependent,
@@ -341,11 +341,9 @@ ALL = Equations, Matrices, Annotated[Rule, MADE], Annotated[Step, MADE], Work, S
 @source
 def settle(e, t, along, u0, u1, v1, state, history):
     """Update the history at the end of a step, which is written to ``history``."""
-    # ``t`` are the instants of the forces of contact and of the end. Contact works from u0 to u1 in
-    # the time ``along`` of a conserving step, or at u1 if that is 0.
+    # ``t`` and ``along`` are as for :func:`~skfem_ancf.actions.forces.kernels.settle_forces`.
     taken = np.empty(1)  # the dissipated work
-    settle_contact(e.forces, t[0], along, u0 if along != 0.0 else u1, u1, taken)
-    settle_elements(e.forces, t[1], u0, u1, v1, taken)
+    settle_forces(e.forces, t, along, u0, u1, v1, taken)
     accept_body(e.body, u0, u1, taken)
     e.span[0] = 0.0
     state.dissipated[0] += taken[0]

@@ -6,11 +6,12 @@ step."""
 
 import numpy as np
 
-from ..actions.forces.kernels import (add_elastic_force, add_element_damping, add_element_tangent,
-                                      element_damping, element_stiffness, put_far_stiffness,
-                                      set_contact_rate)
+from ..actions.contact.tables import RATE
+from ..actions.forces.kernels import (add_elastic_force, add_element_tangent, element_damping,
+                                      element_stiffness, put_far_stiffness)
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, add_load_stiffness,
-                              carry_eigenstrains, constraint, external_force, joint_directions)
+                              add_products, carry_eigenstrains, constraint, external_force,
+                              joint_directions)
 from ..beam.strain_energy import (add_force_of, add_viscous_stress, body_force, body_linearised,
                                   body_mean_stress, body_mixed, body_stress, body_tangent)
 from ..core.band import (add_multiple, clear, copy, factorize, factorize_complex, fix, fix_stored,
@@ -51,8 +52,10 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     clear(w.D.flat)
     if matrices.dampers.active > 0:
         add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
-        if matrices.dampers.elements > 0:
-            add_element_damping(e.forces, s.times[at], origin, w.y[1], w.D)
+        if matrices.dampers.elements > 0 and e.forces.start.size > 0:
+            rates = np.empty(e.forces.size)
+            element_damping(e.forces, s.times[at], origin, w.y[1], rates)
+            add_products(w.D.flat, e.forces.band_at, e.forces.band_weight, rates, e.forces.band_of)
     if w.J.shape[0] > 0:
         _rows(e, matrices, s, w, at)
     ld, width, shape = w.real.ld, w.real.width, (origin.size, w.real.ld)
@@ -188,7 +191,7 @@ def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, p
     # and displacements and multipliers of the points, (s, n, N + m).
     method = w.method
     if e.lasting > 0:
-        set_contact_rate(e.forces, s.h)
+        e.forces.contacts.memory[RATE] = 1.0 / (s.h * s.h)
     for k in range(rows.shape[0]):
         if k > 0 or s.begun > 0:
             _ahead(method, method.ahead if k > 0 else s.ahead, s.h, state.last_dt[0], w)

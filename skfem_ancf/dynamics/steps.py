@@ -15,10 +15,10 @@ a discrete gradient with ``J (u_1 - u_0) = Phi(u_1) - Phi(u_0)``.
 
 import numpy as np
 
-from ..actions.contact.tables import PRESSURES
-from ..actions.forces.kernels import (add_contact_tangent, add_elastic_force, add_friction_tangent,
-                                      augment_contact, element_stiffness, keep_entries, may_pass,
-                                      put_far_stiffness, rests_by_margin, set_contact_rate)
+from ..actions.contact.tables import AUGMENT, DAMPED_TANGENT, PRESSURES, RATE, TANGENT, Request
+from ..actions.forces.kernels import (add_elastic_force, ask_obstacles, at_rest, at_time,
+                                      element_stiffness, keep_entries, nothing_touches,
+                                      put_far_stiffness)
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_curvature_force, add_joint_force,
                               add_load_stiffness, add_products, carry_eigenstrains, constraint,
                               joint_directions, mean_external_force)
@@ -185,11 +185,12 @@ def tangent(e, matrices, rule, s, w, state):
     u, u0 = w.x.u, w.y[0] if conserving else w.x.u
     keep_entries(forces, s.t_force, s.stiffness_factor, u0, u, state.guess[0])
     if forces.contacts.number > 0:
-        add_contact_tangent(forces, s.t_force, s.dt if conserving else 0.0, u0, u, matrices.A)
+        span, ld, top = s.dt if conserving else 0.0, matrices.A.ld, matrices.A.top
+        ask_obstacles(forces, Request(TANGENT, s.t_force, span, 0.0, ld, top), u0, u, A)
         if dampers.elements > 0:
             to_damping_velocity(e.free, rule, s, w)
-            add_friction_tangent(forces, s.t_force, rate, w.x.middle, w.x.damping_velocity,
-                                 matrices.A)
+            ask_obstacles(forces, Request(DAMPED_TANGENT, s.t_force, 0.0, rate, ld, top),
+                          w.x.middle, w.x.damping_velocity, A)
     for i in indices(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
 
@@ -328,8 +329,8 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _)
         if e.lasting > 0:
             settle(e, (s.t_force, s.t), s.dt if rule.conserving > 0 else 0.0, w.y[0], w.x.u, w.x.v,
                    state, memories[n, 2:])
-        touches = contacts.number > 0 or e.forces.changing > 0
-        memories[n, 1] = 1.0 if touches and may_pass(e.forces, w.y[0], w.x.u) else 0.0
+        free = nothing_touches(e.forces, w.y[0]) and nothing_touches(e.forces, w.x.u)
+        memories[n, 1] = 0.0 if free else 1.0
         # the end of the step becomes the start of the next
         copy(w.x.u, w.y[0])
         copy(w.x.v, w.y[1])
@@ -358,7 +359,7 @@ def _iterate(e, matrices, rule, s, w, state):
         if e.lasting >= MATERIALS:
             carry_eigenstrains(e.loads, s.ends)
         if contacts.lasting > 0:
-            set_contact_rate(e.forces, s.dt)
+            contacts.memory[RATE] = 1.0 / (s.dt * s.dt)
     state.guess[0] = 1 if e.forces.paired > 0 else 0
     while left > 0:
         left, most = left - 1, most - 1
@@ -384,10 +385,12 @@ def _iterate(e, matrices, rule, s, w, state):
         if status == GO_ON:
             status = _judged(e, matrices, rule, s, w, state, limits[0], limits[1])
         if status == DONE and contacts.lasting >= PRESSURES:
-            augment_contact(e.forces, s.t, w.x.u, taken)
+            taken[0] = 0.0  # gets the number of pressures that were too small
+            ask_obstacles(e.forces, at_time(AUGMENT, s.t), w.x.u, w.x.u, taken)
             if taken[0] > 0.0:
                 status, left, state.correction[0] = GO_ON, min(ITERATIONS, most), -1.0
-        if status == DONE and state.guess[0] > 0 and rests_by_margin(e.forces, w.y[0], w.x.u):
+        if status == DONE and state.guess[0] > 0 and at_rest(e.forces, w.y[0], w.x.u, 1) and (
+                not at_rest(e.forces, w.y[0], w.x.u, 0)):  # margins alone said so
             status, state.guess[0] = GO_ON, 0
         if status == RESTART:
             _start(e, matrices, rule, s, w, state)

@@ -5,8 +5,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ..actions.forces.kernels import (NO_SPAN, add_elastic_force, add_element_tangent,
-                                      contact_along, contact_work, looked_free, nothing_touches,
-                                      rests, way_is_clear)
+                                      contact_along, contact_work, looked_free, rests,
+                                      way_is_clear)
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
@@ -189,7 +189,7 @@ def hold_back(e, t, loose, clear, u, R, du, dm):
     parts, most = int(min(max(np.ceil(two[1]), 1.0), PARTS)), 1.0
     if loose > 0.0 and two[1] > 1.0:
         parts, most = 1, 1.0 / two[1]
-    before, low, high, s = _work(e, t, u, du, scratch), 0.0, most, most
+    before, low, high, s = contact_work(e.forces, t, u, du, scratch), 0.0, most, most
     left, left_low = work, work
     for k in range(parts):
         high = most * (k + 1.0) / parts
@@ -231,14 +231,8 @@ def motion_is_clear(e, motion):
 
 
 @source
-def _work(e, t, u, du, scratch):
-    """Product of the contact force at u and du."""
-    return 0.0 if nothing_touches(e.forces, u) else contact_work(e.forces, t, u, du, scratch)
-
-
-@source
 def _left(e, t, u, du, s, work, along, before, scratch):
     """Residual along the correction at a fraction s of it."""
     ahead = u.copy()
     add_multiple(s, du, ahead)
-    return (1.0 - s) * work - (_work(e, t, ahead, du, scratch) - before - s * along)
+    return (1.0 - s) * work - (contact_work(e.forces, t, ahead, du, scratch) - before - s * along)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from ..actions.bound import BoundConstraint, BoundForce, MemberForce
-from ..actions.contact.pairs import search_anew
+from ..actions.contact.tables import ANCHORED
 from ..actions.forces.kernels import add_resisting_force
 from ..actions.forces.system import Forces
 from ..actions.joints.base import UnitDirector
@@ -218,7 +218,8 @@ class System:
         other.clock = self.clock
         other.histories.put(history)
         other.histories.span[0] = span
-        search_anew(other.forces.pairs)
+        for pair in other.forces.pairs:  # search anew: facets are near, and steps begin, elsewhere
+            pair.skin[:], pair.start_at[:] = 0.0, np.nan
         return other
 
     def recycle(self) -> None:
@@ -231,7 +232,9 @@ class System:
         if not self.forces.contacts.anchored:
             return self
         other = self.after(self.histories.values, float(self.histories.span[0]))
-        other.forces.contacts.stick()
+        # Points that have slipped are at the limit of friction, on one side of it or the other by
+        # the last digit; and of a disturbance either way friction resists one.
+        other.forces.contacts.tables.memory[ANCHORED] *= 2.0
         return other
 
     def of(self, load_or_member: Load | Beam | RigidBody | Domain) -> slice:

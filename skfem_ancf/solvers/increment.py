@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..actions.contact.tables import PASSED
+from ..actions.contact.tables import AUGMENT, PASSED
 from ..core import NO_FACTORS, Array, ConvergenceError
 from ..equations import stability
 from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, CLOSED, NEVER, joint_gap, rules_of
@@ -100,10 +100,11 @@ class Increment:
                 break
             found = self.iterate(found)
         for k in range(1, AUGMENTED + 1):
-            if not contacts.augmented or contacts.augment(found.u, self.time) == 0:
+            if not contacts.augmented or contacts.ask_all(AUGMENT, found.u, self.time) == 0.0:
                 break
             if k % SLOW == 0:
-                stiffening = np.where(contacts.with_multipliers, STIFFER, 1.0) * (
+                multipliers = [group.law.tolerance > 0.0 for _, group in contacts.groups]
+                stiffening = np.where(multipliers, STIFFER, 1.0) * (
                     1.0 + contacts.stiffening) - 1.0
                 contacts.stiffen(np.minimum(stiffening, STIFFEST), found.u, self.time)
             found = self.iterate(found)

@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import Array, Band, InputError, handle_of, refuse, shown
-from .crossing import CrossingGuard, middle_of
+from .crossing import CrossingGuard
 from .kernels import (BEYOND, damp, of_contacts, of_pair, project, response, set_rates, touch_of,
                       untouched)
 from .points import add_resistance, mean_pressure, potential, pressure_slope
-from .tables import (ANCHORED, ANCHORS, AUGMENT, BEGIN, CUSTOM, END, FORCE, HEAD, NOW, POSE, POSES,
+from .tables import (ANCHORED, ANCHORS, BEGIN, CUSTOM, END, FORCE, HEAD, NOW, POSE, POSES,
                      PRESSURES, RATE, SAFE, SEEN as SEEN_AT, SETTLE, TANGENT, TINY, TURNS,
                      ContactTables, Law, Pair, Request, carried, clear_table, set_clear,
-                     taken_back, transition,
-                     weights_of_motion)
+                     taken_back, transition, weights_of_motion)
 
 
 #: Penetration relative to the height that stiffens an obstacle, and the one for which a stiffness
@@ -118,12 +117,22 @@ class Contacts:
     def _pair(self, k, group, poses, varies, handle):
         """The :class:`~skfem_ancf.actions.contact.tables.Pair` of a group, without history."""
         pairs, none = np.arange(len(group.weights))[:, None], np.zeros(0)
+        # position and weights of each element's middle, and the spread of its points' weights
+        n, m = group.elements, group.points
+        each = group.weights.reshape(-1, n, m)
+        mean, half = each.mean(axis=2), len(group.weights) // 2
+        spread = np.abs(each - mean[..., None]).max(axis=2)
+        spread[0] = 0.0  # both places together are a translation
+        spread[half] = np.maximum(spread[half], np.abs(each[0] - mean[0][:, None]).max(axis=1))
+        start = group.starts[:2].reshape(2, n, m).mean(axis=2)
+        middles = np.concatenate([start, np.stack([mean, spread], axis=1).reshape(-1, n)])
         return Pair(
-            k, self.obstacles[k].shape.kind, self.numbers(k), varies, handle,
+            k, self.obstacles[k].shape.kind, self.obstacles[k].shape.numbers_about(self.origin),
+            varies, handle,
             poses[k * POSES:(k + 1) * POSES].reshape(3, POSE),
             np.ascontiguousarray(group.first // 2 + pairs, dtype=np.int64),
             *map(np.ascontiguousarray, (group.weights, group.slopes, group.areas, group.offsets,
-                                        group.starts, middle_of(group))),
+                                        group.starts, middles)),
             group.law, self.softness, none, none, none, none, none + 0j, none)
 
     def _tables_after(self, memory):
@@ -148,10 +157,6 @@ class Contacts:
             out = np.maximum(out, weights_of_motion(
                 a.T, group.first[:, None] // 2 + pairs, N // 2, pairs % (len(a) // 2) == 0))
         return clear_table(out, BEYOND * max(group.law.radius for _, group in self.groups))
-
-    def numbers(self, k: int) -> Array:
-        """Parameters of the shape of obstacle k, relative to the origin."""
-        return self.obstacles[k].shape.numbers_about(self.origin)
 
     def pose(self, k: int, t: float, rates: bool = True) -> Array:
         """Pose of obstacle k, with its pivot relative to the origin; shape (10,)."""
@@ -202,12 +207,6 @@ class Contacts:
         other._answers = self  # as handle
         return other
 
-    def stick(self) -> None:
-        """Let all points that touch stick in tangents, also those that slip."""
-        # Points that have slipped are at the limit of friction, on one side of it or the other by
-        # the last digit; and of a disturbance either way friction resists one.
-        self.tables.memory[ANCHORED] *= 2.0
-
     def begin(self, u: Array, t: float, anew: bool) -> None:
         """Begin a run; ``anew``, friction begins at u."""
         memory = self.tables.memory
@@ -222,11 +221,6 @@ class Contacts:
         first = HEAD + len(self.groups)
         return self.tables.memory[first:first + len(self.groups)]
 
-    @property
-    def with_multipliers(self) -> Array:
-        """Whether a group uses the augmented Lagrangian, (groups,)."""
-        return np.array([group.law.tolerance > 0.0 for _, group in self.groups])
-
     def stiffen(self, stiffening: Array, u: Array, t: float) -> None:
         """Set the stiffening; the tractions of sticking points at u do not change."""
         for k, ((which, _), x, _) in enumerate(self.look(u, t)):
@@ -236,25 +230,6 @@ class Contacts:
             pair.anchors[:] = points + part * (pair.anchors - points)
             pair.slips[:] *= part
         self.stiffening[:] = stiffening
-
-    def stiffened(self, k: int, u: Array, t: float, gap: Array) -> tuple[Array, Array, Array]:
-        """Derivatives by the logarithm of the stiffness of group k, and forces, of the pressure."""
-        # Those of the force on the degrees of freedom (N,); then by point the derivative, and the
-        # force, times the penetration, (n,). ``gap`` (n,) is that at u and t.
-        _, group = self.groups[k]
-        memory, pair, factor = self.tables.memory, self.tables.pairs[k], 1.0 + self.stiffening[k]
-        width, a = transition(pair), np.maximum(-gap, 0.0)
-        push = factor * group.law.stiffness * group.areas * a
-        out, sticks = np.zeros((2, len(u))), memory[ANCHORED]
-        try:
-            memory[ANCHORED] = 0.0
-            for change, force in zip((-CHANGE, CHANGE), out):
-                self.stiffening[k] = factor * (1.0 + change) - 1.0
-                of_pair(pair, Request(FORCE, t, 0.0, 0.0, 0, 0), u, u, force, np.empty(1))
-        finally:
-            memory[ANCHORED], self.stiffening[k] = sticks, factor - 1.0
-        return ((out[0] - out[1]) / (2.0 * CHANGE), push * pressure_slope(a, width) * a,
-                push * mean_pressure(a, a, width))
 
     def yielding(self, u: Array, t: float, respond: Callable[..., Any]) -> Array:
         """The relative error of the answer by the penetration, shape (groups,), to first order."""
@@ -266,7 +241,23 @@ class Contacts:
         for k, ((_, group), _, gap) in enumerate(self.look(u, t)):
             if group.largest_factor <= 1.0 or not np.any(gap < 0.0):
                 continue
-            force, change, work = self.stiffened(k, u, t, gap)
+            # derivatives of the force on the degrees of freedom by the logarithm of the stiffness;
+            # by point the derivative, and the force, times the penetration
+            pair, factor, penetration = (
+                self.tables.pairs[k], 1.0 + self.stiffening[k], np.maximum(-gap, 0.0))
+            width, push = transition(pair), (
+                factor * group.law.stiffness * group.areas * penetration)
+            ends, sticks = np.zeros((2, len(u))), self.tables.memory[ANCHORED]
+            try:
+                self.tables.memory[ANCHORED] = 0.0
+                for step, end in zip((-CHANGE, CHANGE), ends):
+                    self.stiffening[k] = factor * (1.0 + step) - 1.0
+                    of_pair(pair, Request(FORCE, t, 0.0, 0.0, 0, 0), u, u, end, np.empty(1))
+            finally:
+                self.tables.memory[ANCHORED], self.stiffening[k] = sticks, factor - 1.0
+            force = (ends[0] - ends[1]) / (2.0 * CHANGE)
+            change = push * pressure_slope(penetration, width) * penetration
+            work = push * mean_pressure(penetration, penetration, width)
             slender = np.ptp(group.starts[:2], axis=1).max() > STOUT * group.height
             if slender and 2.0 * work[-2 * group.points:].sum() < work.sum():
                 continue
@@ -281,17 +272,15 @@ class Contacts:
 
     def settle(self, u: Array, t: float) -> float:
         """Update anchors of slipped points; returns the work of friction."""
-        return float(self._ask(SETTLE, u, t)) if self.anchored else 0.0
+        return self.ask_all(SETTLE, u, t) if self.anchored else 0.0
 
-    def augment(self, u: Array, t: float) -> int:
-        """Update multipliers; returns the number of points with large penetration or gap."""
-        return int(self._ask(AUGMENT, u, t))
-
-    def _ask(self, what, u, t):
+    def ask_all(self, what: Any, u: Array, t: float) -> float:
+        """What all pairs answer to SETTLE, or to AUGMENT: the number of points with large
+        penetration or gap, whose multipliers were updated."""
         self._place(t)
         out = np.zeros(1)
         of_contacts(self.tables, Request(what, t, 0.0, 0.0, 0, 0), u, u, out)
-        return out[0]
+        return float(out[0])
 
     # restrictions of solvers
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array
-from .gap import outline
+from .kernels import outline
 from .tables import CUSTOM, taken_back
 
 #: Largest number of samples of a path; number of points per batch.
@@ -63,7 +63,7 @@ class _Path:
     def __init__(self, contacts, k):
         self._contacts, (self._which, self._group) = contacts, contacts.groups[k]
         self.obstacle = contacts.obstacles[self._which]
-        self._numbers, group = contacts.numbers(self._which), self._group
+        self._numbers, group = self.obstacle.shape.numbers_about(contacts.origin), self._group
         self._dofs = group.first[::group.points, None] + np.arange(2 * len(group.weights))
         self._weights = [w.reshape(len(w), group.elements, -1).transpose(1, 0, 2)
                          for w in (group.weights, group.slopes) if len(w)]
@@ -71,34 +71,29 @@ class _Path:
 
     def first(self, u, v, t):
         """The first step in which a point crosses the obstacle, or the number of steps."""
-        size = max(1, TOGETHER // len(self._group.first))
-        for k in range(0, len(t) - 1, size):
-            part = slice(k, k + size + 1)
-            found = self._first_of(u[part], None if v is None else v[part], t[part])
-            if found is not None:
-                return k + found
+        size, depth = max(1, TOGETHER // len(self._group.first)), self._group.depth
+        for start in range(0, len(t) - 1, size):
+            some = slice(start, start + size + 1)
+            z, times = self._vectors(u[some]), t[some]
+            x = self._seen(z, times)
+            gap = self._gap(x, times)
+            self.deepest = max(self.deepest, -float(np.min(gap)))
+            path = np.hypot(*np.moveaxis(np.diff(x, axis=0), 1, 0))
+            if v is not None:
+                h, change, rates = (np.diff(times)[:, None, None], np.diff(z, axis=0),
+                                    self._vectors(v[some]))
+                path += BENT * sum(self._sizes(h * rate - change)
+                                   for rate in (rates[:-1], rates[1:]))
+            most = depth + np.maximum(-np.minimum(gap[:-1], gap[1:]), 0.0)
+            long = path - gap[:-1] - gap[1:] > 2.0 * most
+            inside = np.maximum(gap[:-1], gap[1:]) < -depth
+            for k in np.flatnonzero((long | inside).any(axis=1)):
+                at, = np.nonzero(long[k] | inside[k])
+                of = slice(start + k, start + k + 2)
+                if self._crosses(at, u[of], None if v is None else v[of], t[of], path[k, at],
+                                 most[k, at], long[k, at], inside[k, at]):
+                    return int(start + k)
         return len(t) - 1
-
-    def _first_of(self, u, v, t):
-        """The first of some steps in which a point crosses the obstacle, or None."""
-        z, depth = self._vectors(u), self._group.depth
-        x = self._seen(z, t)
-        gap = self._gap(x, t)
-        self.deepest = max(self.deepest, -float(np.min(gap)))
-        path = np.hypot(*np.moveaxis(np.diff(x, axis=0), 1, 0))
-        if v is not None:
-            h, change, rates = np.diff(t)[:, None, None], np.diff(z, axis=0), self._vectors(v)
-            path += BENT * sum(self._sizes(h * rate - change) for rate in (rates[:-1], rates[1:]))
-        most = depth + np.maximum(-np.minimum(gap[:-1], gap[1:]), 0.0)
-        long = path - gap[:-1] - gap[1:] > 2.0 * most
-        inside = np.maximum(gap[:-1], gap[1:]) < -depth
-        for k in np.flatnonzero((long | inside).any(axis=1)):
-            at, = np.nonzero(long[k] | inside[k])
-            of = slice(k, k + 2)
-            if self._crosses(at, u[of], None if v is None else v[of], t[of], path[k, at],
-                             most[k, at], long[k, at], inside[k, at]):
-                return int(k)
-        return None
 
     def _crosses(self, at, u, v, t, path, most, long, inside):
         """True if one of some points crosses the obstacle in a step."""
@@ -112,9 +107,13 @@ class _Path:
             return False
         at, most = at[chosen], most[chosen]
         parts = int(np.clip(np.ceil(path[chosen].max() / (2.0 * self._group.depth)), 2, MOST_PARTS))
+        change, h = u[1] - u[0], t[1] - t[0]
         for s in np.arange(1, parts) / parts:
-            time = t[:1] + s * (t[1] - t[0])
-            x = self._seen(self._vectors(_displacement_within(u, v, t, s)[None]), time)[..., at]
+            time, within = t[:1] + s * h, u[0] + s * change
+            if v is not None:  # cubic
+                within = within + s * (1.0 - s) * (
+                    (1.0 - s) * (h * v[0] - change) - s * (h * v[1] - change))
+            x = self._seen(self._vectors(within[None]), time)[..., at]
             if np.any(-self._gap(x, time) > most):
                 return True
         return False
@@ -161,24 +160,3 @@ class _Path:
         else:
             out[0] = shape.distance(x + self._contacts.origin[:, None], t)
         return -out if shape.hollow else out
-
-
-def _displacement_within(u, v, t, s):
-    """Displacement within a step: cubic, or linear without velocities."""
-    change, h = u[1] - u[0], t[1] - t[0]
-    straight = u[0] + s * change
-    if v is None:
-        return straight
-    return straight + s * (1.0 - s) * ((1.0 - s) * (h * v[0] - change) - s * (h * v[1] - change))
-
-
-def middle_of(group: Any) -> Array:
-    """Position and weights of each element's middle, and the spread of its points' weights."""
-    n, m = group.elements, group.points
-    each = group.weights.reshape(-1, n, m)
-    mean, half = each.mean(axis=2), len(group.weights) // 2
-    spread = np.abs(each - mean[..., None]).max(axis=2)
-    spread[0] = 0.0  # both places together are a translation
-    spread[half] = np.maximum(spread[half], np.abs(each[0] - mean[0][:, None]).max(axis=1))
-    start = group.starts[:2].reshape(2, n, m).mean(axis=2)
-    return np.concatenate([start, np.stack([mean, spread], axis=1).reshape(-1, n)])

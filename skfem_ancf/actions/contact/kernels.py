@@ -1,5 +1,9 @@
-"""Contact of beams with obstacles: what may touch, and the points of
+"""Contact of beams with obstacles: gaps of their surfaces, what may touch, and the points of
 :mod:`skfem_ancf.actions.contact.points` for it.
+
+A surface point is ``X = x + c n(s)``: a point x of the body, and for cables the normal n of the
+slope s of the axis at a distance c. Its gap, the signed distance from an obstacle, is negative
+inside of that; the gradient is the normal at the closest point.
 
 A broad search by elements compares the gap of the middle of each with the radius of its points. Of
 points in contact the gap in the middle of a step has a normal, whose correction by a multiple of
@@ -15,14 +19,13 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 
 from ...core.band import smallest
-from ...core import C1, F1, F2, I1, MADE, apart, indices, source
+from ...core import C1, F1, F2, I1, MADE, apart, custom_distance, indices, source
 from ..tables import add_each
-from .gap import Placed, carried, distances, middles, outside, placed
-from .points import (RESPONSE, TOUCH, Touch, add_bend, add_coupling, add_resistance, by_slope,
-                     cross, dot, mean_pressure, pressure_slope, product, put, respond,
-                     return_mapping, scaled, spread, turned, vector)
-from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, DAMPED_TANGENT, END,
-                     FAR, FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SAFE, SETTLE, TINY,
+from .points import (SHORT, TOUCH, Touch, add_bend, add_coupling, add_resistance, by_slope, cross,
+                     dot, mean_pressure, pressure_slope, product, put, respond, return_mapping,
+                     scaled, size, spread, turned, vector)
+from .tables import (ALONG, ANCHORED, ANCHORS, AUGMENT, BEGIN, BILATERAL, CUSTOM, DAMPED_TANGENT,
+                     END, FAR, FOLLOWED, FORCE, NOW, PAIR, RATE, RESISTING, SAFE, SETTLE, TINY,
                      ContactTables, Request, is_clear, pair_of, set_clear, stiffness_factor,
                      transition)
 
@@ -33,6 +36,163 @@ CLOSE = 1e-5
 #: Anchors of slipped points are inside of the limit by these parts of it and of an element, so that
 #: they stick at the start of the next step whatever the last digit.
 INSIDE, NOWHERE = 1e-9, 1e-14
+#: Number of parameters of a circle.
+DISC = 5
+
+
+# surface points and their gaps
+
+
+class Placed(NamedTuple):
+    """Points on the axis, slopes there, and surface points, (n,), with their gaps."""
+
+    x: C1
+    t: C1
+    surface: C1
+    gap: F1
+
+
+@source
+def placed(pair, u, factor, at):
+    """Positions and slopes of points: factor times the reference ones plus displacements."""
+    n, z = at.size, u.view(np.complex128)
+    x, t, start = np.empty(n, np.complex128), np.empty(n, np.complex128), pair.starts
+    for i in indices(n):
+        m = at[i]
+        x[i] = scaled(factor, vector(start[0, m], start[1, m]))
+        t[i] = scaled(factor, vector(start[2, m], start[3, m]))
+    for k in range(pair.weights.shape[0]):
+        for i in indices(n):
+            x[i] += scaled(pair.weights[k, at[i]], z[pair.dofs[k, at[i]]])
+    for k in range(pair.slopes.shape[0]):
+        for i in indices(n):
+            t[i] += scaled(pair.slopes[k, at[i]], z[pair.dofs[k, at[i]]])
+    return x, t
+
+
+@apart("contacts", PAIR, F1, float, F2, F1)
+def middles(pair, u, factor, x, radius):
+    """Positions of element middles (2, n), and bounds of the distance of their points."""
+    # Reference positions are multiplied by ``factor``.
+    n, pairs, z = x.shape[1], pair.dofs.shape[0], u.view(np.complex128)
+    m = pair.areas.size // n
+    first, p, q = pair.dofs[0, ::m], pair.middles[0], pair.middles[1]
+    for e in indices(n):
+        x[0, e], x[1, e], radius[e] = factor * p[e], factor * q[e], pair.law.radius
+    for k in range(pairs):
+        p, q, same = pair.middles[2 + 2 * k], pair.middles[3 + 2 * k], 1.0 * (k == pairs // 2)
+        dofs = pair.dofs[k, ::m]
+        for e in indices(n):
+            a = z[dofs[e]]
+            x[0, e] += p[e] * a.real
+            x[1, e] += p[e] * a.imag
+            # both places of an element together are a translation
+            radius[e] += q[e] * size(a - scaled(same, z[first[e]]))
+
+
+@source
+def outside(x, t, offset):
+    """Surface points beside points x of an axis with the slope t."""
+    return x + scaled(offset / np.sqrt(np.maximum(dot(t, t), SHORT)), turned(t))
+
+
+@source
+def carried(q, p, x):
+    """Points that move with an obstacle from pose p to pose q."""
+    # x + (turn - 1) (x - pivot): a pivot far away adds no round-off
+    cos, sin = q[2] * p[2] + q[3] * p[3] - 1.0, q[3] * p[2] - q[2] * p[3]
+    a, b = x.real - p[0] - p[4], x.imag - p[1] - p[5]
+    return x + vector(q[0] - p[0] + cos * a - sin * b, q[1] - p[1] + sin * a + cos * b)
+
+
+@apart("contacts", PAIR, int, bool, F2, F2)
+def distances(pair, which, whole, x, out):
+    """Gap, its gradient and, if ``whole``, second derivatives xx, xy, yy at points x, (6, n)."""
+    pose, y, side = pair.poses[which], np.empty(x.shape), pair.law.side
+    cos, sin = pose[2], pose[3]
+    for i in indices(x.shape[1]):
+        p, q = x[0, i] - pose[0], x[1, i] - pose[1]
+        a, b = p - pose[4], q - pose[5]
+        y[0, i], y[1, i] = p + (cos - 1.0) * a + sin * b, q + (cos - 1.0) * b - sin * a
+    if pair.kind == CUSTOM:
+        custom_distance(pair.custom, pair.obstacle, pose[9], y, out)
+    else:
+        outline(pair.shape, whole, y, out)
+    for i in indices(x.shape[1]):
+        out[0, i] *= side
+    if not whole:
+        return
+    for i in indices(x.shape[1]):
+        a, b = side * out[1, i], side * out[2, i]
+        p, q, r = side * out[3, i], side * out[4, i], side * out[5, i]
+        out[1, i], out[2, i] = cos * a - sin * b, sin * a + cos * b
+        c, d = 0.5 * (p + r), 0.5 * (p - r)
+        e, f = (cos * cos - sin * sin) * d - 2.0 * cos * sin * q, 2.0 * cos * sin * d + (
+            cos * cos - sin * sin) * q
+        out[3, i], out[4, i], out[5, i] = c + e, f, c - e
+
+
+@source
+def disc(shape, whole, y, out):
+    """Gap of a circle, from its radius and a point of its surface with the normal there."""
+    # The difference of squares is zero at that point, so that a circle far larger than the scene
+    # has gaps without the round-off of its radius.
+    radius, px, py, nx, ny = shape[0], shape[1], shape[2], shape[3], shape[4]
+    for i in indices(y.shape[1]):
+        a, b = y[0, i] - px, y[1, i] - py
+        gx, gy = a + radius * nx, b + radius * ny
+        size = np.maximum(np.sqrt(gx * gx + gy * gy), TINY)
+        out[0, i] = (a * a + b * b + 2.0 * radius * (nx * a + ny * b)) / (size + radius)
+        if whole:
+            gx, gy = gx / size, gy / size
+            out[1, i], out[2, i] = gx, gy
+            out[3, i], out[4, i], out[5, i] = gy * gy / size, -gx * gy / size, gx * gx / size
+
+
+@apart("contacts", F1, bool, F2, F2)
+def outline(shape, whole, y, out):
+    """Closest point projection on a polygon with rounded corners."""
+    # Parameters of the shape: radius of the corners, relative ends of the edges, then for each
+    # corner: position, vector to the next one, 1 or -1 for convex or not. The surface is a line
+    # near an edge, a circle near a corner. A circle alone has five parameters, see :func:`disc`.
+    if shape.size == DISC:
+        disc(shape, whole, y, out)
+        return
+    radius, low, high = shape[0], shape[1], shape[2]
+    n, best = (shape.size - 3) // 5, np.empty(y.shape[1])
+    for i in indices(y.shape[1]):
+        best[i] = 1e300
+    for c in range(6 if whole else 1):
+        for i in indices(y.shape[1]):
+            out[c, i] = 0.0
+    for k in range(n):
+        p, after = shape[3 + 5 * k:8 + 5 * k], shape[7 + 5 * ((k + 1) % n)]
+        px, py, before = p[0], p[1], p[4]
+        ex, ey = p[2], p[3]
+        square = np.maximum(ex * ex + ey * ey, TINY)
+        nx, ny = ey / np.sqrt(square), -ex / np.sqrt(square)
+        for i in indices(y.shape[1]):
+            a, b = y[0, i] - px, y[1, i] - py
+            s = np.minimum(np.maximum((a * ex + b * ey) / square, low), high)
+            c, d = a - s * ex, b - s * ey
+            far = c * c + d * d
+            new = 1.0 * (far < best[i])
+            best[i] = np.minimum(best[i], far)
+            inner = 1.0 * (s > low) * (s < high)
+            corner = (1.0 - inner) * (before * (s < 0.5) + after * (s >= 0.5))
+            size = np.maximum(np.sqrt(far), TINY)
+            out[0, i] += new * (inner * (nx * a + ny * b) + corner * size - radius - out[0, i])
+            if whole:
+                bend = corner / size
+                gx, gy = inner * nx + bend * c, inner * ny + bend * d
+                out[1, i] += new * (gx - out[1, i])
+                out[2, i] += new * (gy - out[2, i])
+                out[3, i] += new * (bend * gy * gy - out[3, i])
+                out[4, i] -= new * (bend * gx * gy + out[4, i])
+                out[5, i] += new * (bend * gx * gx - out[5, i])
+
+
+# requests
 
 
 class Spot(NamedTuple):
@@ -79,7 +239,11 @@ def of_pair(pair, request, u, v, out, least):
     """Add the answer of the active points of a pair; of a FORCE set also the least gap."""
     what, same, law = request.what, request.span == 0.0, pair.law
     if what == ALONG:  # the largest displacement of an element's middle
-        out[1] = max(out[1], _relative_travel(pair, v))
+        rows, square = np.empty((3, pair.middles.shape[1])), 0.0
+        middles(pair, v, 0.0, rows[:2], rows[2])
+        for e in range(rows.shape[1]):
+            square = max(square, rows[0, e] * rows[0, e] + rows[1, e] * rows[1, e])
+        out[1] = max(out[1], np.sqrt(square) / law.radius)
     resists = what == RESISTING or what == DAMPED_TANGENT
     if resists and law.damping == 0.0:
         return
@@ -127,24 +291,40 @@ def _answer(pair, request, same, touch, spot, v, out):
     n = at.size
     if what == SETTLE:
         _settle(pair, same, touch, spot, r, out)
-    elif what == FORCE:
+        return
+    if what == FORCE:
         R = np.zeros((4, n))
         add_resistance(touch, r, R)
         spread(pair.dofs, pair.weights, pair.slopes, at, R, out.view(np.complex128))
+        return
+    # first the derivatives due to directions that turn; (x, y) in row 4 x + y
+    K, half = np.zeros((16, n)), 1.0 if same else 0.5
+    for i in indices(n):
+        normal, t, offset, w = spot.normal[i], spot.slope[i], pair.offsets[at[i]], spot.away[i]
+        P, T, s = r.pressure[i], r.friction[i], half * r.spring[i]
+        xx, xy, yy = spot.bend[0, i], spot.bend[1, i], spot.bend[2, i]
+        a, b = xy * w.real - xx * w.imag, yy * w.real - xy * w.imag  # the tangent at the anchor
+        # of the surface point, then of position and slope
+        k = ((s * normal.imag * a - P * xx - T * xy, s * normal.imag * b - P * xy - T * yy),
+             (T * xx - P * xy - s * normal.real * a, T * xy - P * yy - s * normal.real * b))
+        p, q = by_slope(t, offset, vector(1.0, 0.0)), by_slope(t, offset, vector(0.0, 1.0))
+        by = (1.0, 0.0, p.real, p.imag), (0.0, 1.0, q.real, q.imag)
+        for x in range(4):
+            for y in range(4):
+                K[4 * x + y, i] = (by[0][x] * (k[0][0] * by[0][y] + k[0][1] * by[1][y])
+                                   + by[1][x] * (k[1][0] * by[0][y] + k[1][1] * by[1][y]))
+        add_bend(t, offset, scaled(-P, normal) + scaled(T, turned(normal)), i, K)
+    add_coupling(touch, r, K)
+    if what == ALONG:
+        rates, value = np.empty((4, n)), np.zeros(n)
+        set_rates(pair, v, at, rates)
+        for x in range(4):
+            for y in range(4):
+                for i in indices(n):
+                    value[i] += K[4 * x + y, i] * rates[x, i] * rates[y, i]
+        add_each(out, 0 * at, value)
     else:
-        K = np.zeros((16, n))
-        _set_curvature(pair, same, touch, spot, r, K)
-        add_coupling(touch, r, K)
-        if what == ALONG:
-            rates, value = np.empty((4, n)), np.zeros(n)
-            set_rates(pair, v, at, rates)
-            for x in range(4):
-                for y in range(4):
-                    for i in indices(n):
-                        value[i] += K[4 * x + y, i] * rates[x, i] * rates[y, i]
-            add_each(out, 0 * at, value)
-        else:
-            _add_stiffness(pair, request, at, K, out)
+        _add_stiffness(pair, request, at, K, out)
 
 
 # what may touch
@@ -179,7 +359,7 @@ def _near_points(pair, what, begin, end):
 
 @source
 def project(pair, which, u, at):
-    """The :class:`~skfem_ancf.actions.contact.gap.Placed` of points."""
+    """The :class:`Placed` of points."""
     x, t = placed(pair, u, 1.0, at)
     n = at.size
     surface, rows = np.empty(n, np.complex128), np.empty((8, n))
@@ -194,17 +374,6 @@ def project(pair, which, u, at):
 def _selected(points, some):
     """Some of the points."""
     return Placed(points.x[some], points.t[some], points.surface[some], points.gap[some])
-
-
-@source
-def _relative_travel(pair, u):
-    """Largest displacement of an element's middle, relative to the radius of its points."""
-    n, square = pair.middles.shape[1], 0.0
-    rows = np.empty((3, n))
-    middles(pair, u, 0.0, rows[:2], rows[2])
-    for e in range(n):
-        square = max(square, rows[0, e] * rows[0, e] + rows[1, e] * rows[1, e])
-    return np.sqrt(square) / pair.law.radius
 
 
 # points in contact
@@ -289,27 +458,6 @@ def set_rates(pair, v, at, rates):
     for i in indices(at.size):
         put(rates, 0, i, x[i])
         put(rates, 1, i, t[i])
-
-
-@apart("contacts", PAIR, bool, TOUCH, SPOT, RESPONSE, F2)
-def _set_curvature(pair, same, touch, spot, r, K):
-    """Set the derivatives due to directions that turn; (x, y) in row 4 x + y."""
-    half = 1.0 if same else 0.5
-    for i in indices(touch.k.size):
-        n, t, offset, w = spot.normal[i], spot.slope[i], pair.offsets[touch.at[i]], spot.away[i]
-        P, T, s = r.pressure[i], r.friction[i], half * r.spring[i]
-        xx, xy, yy = spot.bend[0, i], spot.bend[1, i], spot.bend[2, i]
-        a, b = xy * w.real - xx * w.imag, yy * w.real - xy * w.imag  # the tangent at the anchor
-        # of the surface point, then of position and slope
-        k = ((s * n.imag * a - P * xx - T * xy, s * n.imag * b - P * xy - T * yy),
-             (T * xx - P * xy - s * n.real * a, T * xy - P * yy - s * n.real * b))
-        p, q = by_slope(t, offset, vector(1.0, 0.0)), by_slope(t, offset, vector(0.0, 1.0))
-        by = (1.0, 0.0, p.real, p.imag), (0.0, 1.0, q.real, q.imag)
-        for x in range(4):
-            for y in range(4):
-                K[4 * x + y, i] = (by[0][x] * (k[0][0] * by[0][y] + k[0][1] * by[1][y])
-                                   + by[1][x] * (k[1][0] * by[0][y] + k[1][1] * by[1][y]))
-        add_bend(t, offset, scaled(-P, n) + scaled(T, turned(n)), i, K)
 
 
 @apart("contacts", PAIR, float, TOUCH, SPOT, F2, F2, F2)

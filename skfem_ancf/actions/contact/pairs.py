@@ -151,12 +151,6 @@ PAIRS: TypeAlias = PairTables
 FACING: TypeAlias = Annotated[Facing, MADE]
 
 
-def search_anew(pairs: list[PairTables]) -> None:
-    """Forget which facets are near, and where the last step began."""
-    for pair in pairs:
-        pair.skin[:], pair.start_at[:] = 0.0, np.nan
-
-
 @primitive("skfem_ancf.equations.loops")
 def pair_tables(tables, k):
     """The PairTables number k of :class:`~skfem_ancf.actions.forces.kernels.ForceTables`."""
@@ -591,24 +585,17 @@ def pair_force(t, z0, z1, same, out, clear):
     clear[0] = f1.clear[0]
     met = meet(t, same, f0, f1)
     if met.at.size > 0:
-        touch = touch_of(t, f0, f1, met)
-        _spread(t, met, touch, respond(touch, t.width, t.friction, 0.0, 1.0), out)
-
-
-@source
-def _spread(t, met, touch, r, out):
-    """Add the forces to those on degrees of freedom."""
-    n, B = met.at.size, t.N.shape[0]
-    R, c, T, dofs = np.zeros((COMPONENTS, n)), np.empty((B, n), np.complex128), np.empty(
-        (B, n), np.complex128), np.empty((B, n), np.int64)
-    add_resistance(touch, r, R)
-    spread(t.point_dofs, t.N, t.D, met.at, R, out)
-    for b in range(B):
-        weights = t.weights[b]
-        for i in indices(n):
-            c[b, i], T[b, i], _ = along(weights, met.e[i], met.zeta[i])
-            dofs[b, i] = t.dofs[b, met.e[i]]
-    spread(dofs, c, T, np.arange(n), R[4:], out)
+        touch, n, B = touch_of(t, f0, f1, met), met.at.size, t.N.shape[0]
+        R, c, T, dofs = np.zeros((COMPONENTS, n)), np.empty((B, n), np.complex128), np.empty(
+            (B, n), np.complex128), np.empty((B, n), np.int64)
+        add_resistance(touch, respond(touch, t.width, t.friction, 0.0, 1.0), R)
+        spread(t.point_dofs, t.N, t.D, met.at, R, out)
+        for b in range(B):
+            weights = t.weights[b]
+            for i in indices(n):
+                c[b, i], T[b, i], _ = along(weights, met.e[i], met.zeta[i])
+                dofs[b, i] = t.dofs[b, met.e[i]]
+        spread(dofs, c, T, np.arange(n), R[4:], out)
 
 
 @apart("pairs", PAIRS, C1, C1, F1, returns=float)

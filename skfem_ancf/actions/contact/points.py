@@ -90,15 +90,6 @@ def _mean_cube(a, b):
 
 
 @source
-def mean_pressure_slope(a, b, width, pressure):
-    """Twice the derivative of the mean by b; ``pressure`` is the mean of bilateral points."""
-    jump = b - a
-    apart = 1.0 * (np.abs(jump) > 1e-3 * (width + np.abs(a) + np.abs(b)))
-    return (pressure_slope(0.5 * (a + b), width) * (1.0 - apart)
-            + 2.0 * (mean_pressure(b, b, width) - pressure) * apart / (jump + (1.0 - apart)))
-
-
-@source
 def return_mapping(trial, limit):
     """Friction traction from a trial traction, and 1 for sticking, 0 for slipping."""
     return np.minimum(np.maximum(trial, -limit), limit), 1.0 * (np.abs(trial) < limit)
@@ -135,7 +126,6 @@ class Response(NamedTuple):
 
 
 TOUCH: TypeAlias = Annotated[Touch, MADE]
-RESPONSE: TypeAlias = Annotated[Response, MADE]
 
 
 @source
@@ -148,7 +138,12 @@ def respond(touch, width, friction, sticks, twice):
     for i in indices(n):
         a, b, k = touch.before[i], touch.after[i], touch.k[i]
         mean, trial = mean_pressure(a, b, width) - touch.held[i], touch.trial[i]
-        P, c = k * mean, k * mean_pressure_slope(a, b, width, mean)
+        # twice the derivative of the mean by b
+        jump = b - a
+        apart = 1.0 * (np.abs(jump) > 1e-3 * (width + np.abs(a) + np.abs(b)))
+        P, c = k * mean, k * (
+            pressure_slope(0.5 * (a + b), width) * (1.0 - apart)
+            + 2.0 * (mean_pressure(b, b, width) - mean) * apart / (jump + (1.0 - apart)))
         rub[i], stuck = return_mapping(trial, friction * P)
         stuck = np.maximum(stuck, sticks)
         pressure[i], slope[i], spring[i] = P, c, twice * stuck * touch.spring[i]

@@ -16,7 +16,6 @@ from ..bound import differences
 from .base import ForceElement
 from .kernels import turned
 
-KINDS = ("force", "moment")
 #: Round-off relative to the sampling time.
 ROUND_OFF = 1e-9
 
@@ -71,7 +70,7 @@ class Control(ForceElement):
         if isinstance(law, type):
             raise InputError(f"law must be a function of time and measurements, got {shown(law)}")
         self.at, self.other, self.beam = at, other, beam
-        self.kind = require_option("kind", kind, KINDS)
+        self.kind = require_option("kind", kind, ("force", "moment"))
         self.points, self.sections = _named("points", points), _named("sections", sections)
         both = {name for name, _ in self.points} & {name for name, _ in self.sections}
         refuse(both, "points and sections must have different names, got {} in both", sorted(both))
@@ -114,17 +113,15 @@ class Control(ForceElement):
 
     def measured(self, x: Array, v: Array) -> dict[str, Any]:
         """Measurements by name."""
-        out: dict[str, Any] = {}
         k = self._ends
-        for name, _ in self.points:
-            out[name] = MeasuredPoint(np.array(x[k]), np.array(v[k]))
-            k += 1
-        for (name, _), start in zip(self.sections, self._starts):
-            y, angle, g = np.append(x[k], start)[:, None], np.empty(1), np.empty((4, 1))
+        out: dict[str, Any] = {name: MeasuredPoint(np.array(at), np.array(rate)) for (
+            name, _), at, rate in zip(self.points, x[k:], v[k:])}
+        k += len(self.points)
+        for (name, _), start, at, rate in zip(self.sections, self._starts, x[k:], v[k:]):
+            y, angle, g = np.append(at, start)[:, None], np.empty(1), np.empty((4, 1))
             turned(np.array([[0.0], [0.0], [1.0], [0.0]]), y, np.zeros(1), angle)
             mean_turning(y, y, g)
-            out[name] = MeasuredSection(float(angle[0]), float(g[:2, 0] @ v[k]))
-            k += 1
+            out[name] = MeasuredSection(float(angle[0]), float(g[:2, 0] @ rate))
         return out
 
     def ask(self, x: Array, v: Array, t: float) -> Any:

@@ -16,10 +16,9 @@ from ..tables import add_each, add_products
 from ..contact.kernels import of_contacts, untouched
 from ..contact.pairs import pair_accept, pair_force, pair_tables
 from ..contact.stretches import straight_within
-from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FAR, FORCE, HAS_ENTRIES, RATE,
-                              SAFE, SEARCHED, SETTLE, TANGENT, TURNS, ContactTables, Request,
-                              RESISTING as RUBBING, is_clear, left_of, motion, set_clear,
-                              share_of)
+from ..contact.tables import (ALONG, FAR, FORCE, HAS_ENTRIES, SAFE, SEARCHED, SETTLE, TANGENT,
+                              TURNS, ContactTables, Request, RESISTING as RUBBING, is_clear,
+                              left_of, motion, set_clear, share_of)
 
 #: Kinds of elements.
 KINDS = 4
@@ -27,9 +26,8 @@ SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(KINDS))
 #: Parameters of an element. All but drags have a coordinate, its stiffness and damping, two
 #: numbers, of a spring the free length, of torsion cosine and sine of the free angle, of a
 #: foundation the normal, and 1 if they act at positive coordinates only. Those of a drag are
-#: factors of the squared normal and tangential velocity. Then rows of the vectors, and of the
-#: derivatives by them. Numba compiles for each int.
-NUMBERS, VECTORS, BLOCK = map(np.int64, (5, 4, 16))
+#: factors of the squared normal and tangential velocity.
+NUMBERS = 5
 TINY = 1e-200
 TURN = 2.0 * np.pi
 #: For the layout of a band where there is none.
@@ -46,7 +44,7 @@ class Kinds(NamedTuple):
 
     number: int
     ends: I1
-    numbers: F1
+    numbers: F2
     turns: F1
 
 
@@ -64,7 +62,7 @@ class ForceTables(NamedTuple):
 
     ``start, at, of, weight`` are vectors in the reference configuration; rows, DOFs and weights of
     their derivatives, of the length ``size``. ``number, ends, numbers``: of elements of the kinds
-    above, of kinds among them, and parameters (5 n,). ``band_at, band_of, band_weight`` are
+    above, of kinds among them, and parameters (5, n). ``band_at, band_of, band_weight`` are
     positions in the band, derivatives and weights; ``row_at, row_of`` those of elements that couple
     distant DOFs. ``custom`` is the handle of user-defined elements or 0, of which ``changing``
     change their pattern; ``clear`` says where they do nothing, see
@@ -79,7 +77,7 @@ class ForceTables(NamedTuple):
     weight: F1
     number: int
     ends: I1
-    numbers: F1
+    numbers: F2
     size: int
     band_at: I1
     band_of: I1
@@ -104,21 +102,15 @@ def vectors_of(tables, u, factor, out):
 
 
 @source
-def _part(kinds, kind, rows, x):
-    """A view of the rows of one kind."""
-    return _table(kinds, rows, x)[:, kinds.ends[kind]:kinds.ends[kind + 1]]
-
-
-@source
-def _table(kinds, rows, x):
-    """A view of the rows of all kinds."""
-    return shaped(x[:rows * kinds.number], (rows, kinds.number))
+def _part(kinds, kind, x):
+    """A view of the columns of one kind."""
+    return x[:, kinds.ends[kind]:kinds.ends[kind + 1]]
 
 
 @source
 def _of(kinds, kind, y, q):
     """Parameters, vectors, and numbers (n,) of one kind."""
-    return (_part(kinds, kind, NUMBERS, kinds.numbers), _part(kinds, kind, VECTORS, y),
+    return (_part(kinds, kind, kinds.numbers), _part(kinds, kind, y),
             q[kinds.ends[kind]:kinds.ends[kind + 1]])
 
 
@@ -128,16 +120,11 @@ ELASTIC, RESISTING, DERIVATIVES, TURNED, SETTLED, PUSHING, ALONG_PUSHING, ENTRIE
 
 
 @source
-def turns_of(tables):
-    """The angles of torsional springs of the kinds, the last of the history data; a view."""
-    memory = tables.contacts.memory
-    return memory[memory.size - tables.ends[TORSION + 1] + tables.ends[TORSION]:]
-
-
-@source
 def kinds_of(tables):
     """The :class:`Kinds` of a scene."""
-    return Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
+    # the angles of their torsional springs are the last of the history data
+    memory, turning = tables.contacts.memory, tables.ends[TORSION + 1] - tables.ends[TORSION]
+    return Kinds(tables.number, tables.ends, tables.numbers, memory[memory.size - turning:])
 
 
 @source
@@ -167,12 +154,6 @@ def at_rest(tables, u0, u1, guess):
     if guess > 0:
         return is_clear(tables.clear, u0, 0.0) and is_clear(tables.clear, u1, 0.0)
     return rests(tables, u0, 0.0) and rests(tables, u1, 0.0)
-
-
-@source
-def rests_by_margin(tables, u0, u1):
-    """True if margins alone say that no changing element does anything at both displacements."""
-    return at_rest(tables, u0, u1, 1) and not at_rest(tables, u0, u1, 0)
 
 
 @source
@@ -210,7 +191,7 @@ def add_elastic_force(tables, t, span, u0, u1, guess, f):
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
     if tables.paired > 0 and not at_rest(tables, u1 if span == 0.0 else u0, u1, guess):
         _add_pairs(tables, span, u0, u1, f)
-    _ask(tables, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
+    ask_obstacles(tables, Request(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
 
 @source
@@ -241,7 +222,7 @@ def add_resisting_force(tables, t, u, v, f):
     """Add the velocity-dependent part of the force."""
     if tables.start.size > 0:
         _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
-    _ask(tables, _at(RUBBING, t), u, v, f)
+    ask_obstacles(tables, at_time(RUBBING, t), u, v, f)
 
 
 @apart("contacts", ContactTables, Annotated[Request, MADE], F1, F1, F1)
@@ -257,27 +238,16 @@ def add_contact(contacts, at, u, v, out):
 
 
 @source
-def _ask(tables, request, u, v, out):
+def ask_obstacles(tables, request, u, v, out):
     """Add the answer of the obstacles to a :class:`~skfem_ancf.actions.contact.tables.Request`."""
     if tables.contacts.number > 0:
         add_contact(tables.contacts, request, u, v, out)
 
 
 @source
-def _at(what, t):
+def at_time(what, t):
+    """A request at one time that needs no band."""
     return Request(what, t, 0.0, 0.0, NONE, NONE)
-
-
-@source
-def add_contact_tangent(tables, t, span, u0, u1, A):
-    """Add the derivative of the mean contact force by u1 to a band: twice, unless u0 = u1."""
-    _ask(tables, Request(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
-
-
-@source
-def add_friction_tangent(tables, t, factor, u, v, A):
-    """Add the derivative of friction and damping to a band; that by velocities times a factor."""
-    _ask(tables, Request(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v, A.flat)
 
 
 @source
@@ -294,16 +264,25 @@ def _is_free(tables, walls, u):
 
 
 @source
-def may_pass(tables, u0, u1):
-    """True if something may touch in a step."""
-    return not (nothing_touches(tables, u0) and nothing_touches(tables, u1))
+def contact_work(tables, t, u, du, f):
+    """Product of the contact force at u and du; f is workspace, zero on return."""
+    if nothing_touches(tables, u):
+        return 0.0
+    ask_obstacles(tables, at_time(FORCE, t), u, u, f)
+    if tables.changing > tables.paired:
+        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
+    if tables.paired > 0:
+        _add_pairs(tables, 0.0, u, u, f)
+    work = dot(f, du)
+    clear(f)
+    return work
 
 
 @source
 def looked_free(tables, t, walls, u, f):
     """:func:`_is_free`, after a look at u; f is workspace, zero on return."""
     if walls:
-        _ask(tables, _at(FORCE, t), u, u, f)
+        ask_obstacles(tables, at_time(FORCE, t), u, u, f)
     if tables.paired > 0:
         _add_pairs(tables, 0.0, u, u, f)
     clear(f)
@@ -337,71 +316,12 @@ def way_is_clear(tables, t, walls, u, du, f):
 
 
 @source
-def contact_work(tables, t, u, du, f):
-    """Product of the contact force at u and du; f is workspace, zero on return."""
-    _ask(tables, _at(FORCE, t), u, u, f)
-    if tables.changing > tables.paired:
-        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
-    if tables.paired > 0:
-        _add_pairs(tables, 0.0, u, u, f)
-    work = dot(f, du)
-    clear(f)
-    return work
-
-
-@source
 def contact_along(tables, t, u, du, out):
     """Derivative of :func:`contact_work` along du, and the largest slip of an element, (2,)."""
     out[0], out[1] = 0.0, 0.0
-    _ask(tables, _at(ALONG, t), u, du, out)
+    ask_obstacles(tables, at_time(ALONG, t), u, du, out)
     if tables.changing > 0:
         call_custom(ELEMENTS, tables.custom, np.int64(ALONG_PUSHING), t, 0.0, u, du, out)
-
-
-@source
-def set_contact_rate(tables, dt):
-    tables.contacts.memory[RATE] = 1.0 / (dt * dt)
-
-
-@source
-def augment_contact(tables, t, u, out):
-    """Augment pressures where penetration at u is too large; their number goes to out, (1,)."""
-    out[0] = 0.0
-    _ask(tables, _at(AUGMENT, t), u, u, out)
-
-
-@source
-def settle_contact(tables, t, span, u0, u1, out):
-    """Update the history data at the end of a step; the dissipated energy goes to out, (1,)."""
-    out[0] = 0.0
-    follow_turns(tables, u1)
-    _ask(tables, Request(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
-
-
-@source
-def settle_elements(tables, t, u0, u1, v, out):
-    """Set the histories of user-defined elements at the end of a step, with the velocity v there.
-    What they dissipate is added to out, (1,)."""
-    if tables.custom > 0 and tables.start.size > 0:
-        n = tables.start.size
-        y, w = np.empty(n), np.empty(2 * n)
-        vectors_of(tables, u0, 1.0, y)
-        vectors_of(tables, u1, 1.0, w[:n])
-        vectors_of(tables, v, 0.0, w[n:])
-        call_custom(ELEMENTS, tables.custom, np.int64(SETTLED), t, 0.0, y, w, out)
-    for k in range(tables.paired):
-        pair = pair_tables(tables, k)
-        if pair.friction > 0.0 and not at_rest(tables, u0, u1, 0):
-            out[0] += pair_accept(pair, _used(pair, u0), _used(pair, u1), pair.history)
-
-
-@source
-def follow_turns(tables, u):
-    """Keep the angles of torsional springs at u, less than half a turn from the last ones."""
-    if tables.contacts.lasting & TURNS:
-        y = np.empty(tables.start.size)
-        vectors_of(tables, u, 1.0, y)
-        _evaluate(tables, np.int64(TURNED), 0.0, 0.0, y, y, y)
 
 
 @apart("elements", ForceTables, float, F1, F1, float, F1)
@@ -422,16 +342,7 @@ def add_element_tangent(tables, t, u, A):
         D, v = np.empty(tables.size), np.zeros(u.size)
         element_stiffness(tables, t, u, v, 0.0, D)
         add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
-    add_contact_tangent(tables, t, 0.0, u, u, A)
-
-
-@source
-def add_element_damping(tables, t, u, v, A):
-    """Add the derivative by v of :func:`add_resisting_force`, without distant couplings."""
-    if tables.start.size > 0:
-        D = np.empty(tables.size)
-        element_damping(tables, t, u, v, D)
-        add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+    ask_obstacles(tables, Request(TANGENT, t, 0.0, 0.0, A.ld, A.top), u, u, A.flat)
 
 
 @source
@@ -440,6 +351,30 @@ def keep_entries(tables, t, factor, u0, u1, guess):
     if tables.changing > 0 and (tables.clear[HAS_ENTRIES] > 0.0 or not at_rest(
             tables, u0, u1, guess)):
         call_custom(ELEMENTS, tables.custom, np.int64(ENTRIES), t, factor, u0, u1, u0)
+
+
+@source
+def settle_forces(tables, t, along, u0, u1, v, out):
+    """Update the histories at the end of a step, with the velocity v there; the dissipated energy
+    goes to out, (1,)."""
+    # ``t`` are the instants of the forces of contact and of the end. Contact works from u0 to u1 in
+    # the time ``along`` of a conserving step, or at u1 if that is 0.
+    out[0], n = 0.0, tables.start.size
+    y, w = np.empty(n), np.empty(2 * n)
+    if tables.contacts.lasting & TURNS or tables.custom > 0:
+        vectors_of(tables, u1, 1.0, w[:n])
+    if tables.contacts.lasting & TURNS:  # less than half a turn from the last ones
+        _evaluate(tables, np.int64(TURNED), 0.0, 0.0, w[:n], w[:n], y)
+    ask_obstacles(tables, Request(SETTLE, t[0], along, 0.0, NONE, NONE),
+                  u0 if along != 0.0 else u1, u1, out)
+    if tables.custom > 0 and n > 0:
+        vectors_of(tables, u0, 1.0, y)
+        vectors_of(tables, v, 0.0, w[n:])
+        call_custom(ELEMENTS, tables.custom, np.int64(SETTLED), t[1], 0.0, y, w, out)
+    for k in range(tables.paired):
+        pair = pair_tables(tables, k)
+        if pair.friction > 0.0 and not at_rest(tables, u0, u1, 0):
+            out[0] += pair_accept(pair, _used(pair, u0), _used(pair, u1), pair.history)
 
 
 @source
@@ -469,15 +404,41 @@ def put_far_stiffness(tables, D, factor, first, S):
 @apart("elements", Annotated[Kinds, MADE], int, F1, F1, float, F1)
 def of_kinds(kinds, what, y, w, factor, out):
     """Evaluate ``what`` for all kinds from vectors y, and end vectors or rates w."""
-    if what == ELASTIC:
-        elastic(kinds, y, w, out)
-    elif what == RESISTING:
-        resisting(kinds, y, w, out)
-    elif what == DERIVATIVES:
-        derivatives(kinds, y, w, factor, out)
+    n, p = kinds.number, kinds.numbers
+    d, v = shaped(y[:4 * n], (4, n)), shaped(w[:4 * n], (4, n))
+    if what == DERIVATIVES:
+        derivatives(kinds, d, v, factor, shaped(out[:16 * n], (16, n)))
+        return
+    if what == TURNED:
+        turned(_part(kinds, TORSION, p), _part(kinds, TORSION, d), kinds.turns, kinds.turns)
+        return
+    f = shaped(out[:4 * n], (4, n))
+    q, g = coordinates(kinds, d), mean_slopes(kinds, d, v if what == ELASTIC else d)
+    if what == ELASTIC:  # a mean between two states, which may be equal
+        r = coordinates(kinds, v)
+        for e in indices(q.size):  # (V1 - V0) / (q1 - q0), V = k q^2 / 2 or zero for q < 0
+            a, b = q[e] * (1.0 - p[4, e] * (q[e] < 0.0)), r[e] * (1.0 - p[4, e] * (r[e] < 0.0))
+            same = np.abs(r[e] - q[e]) < TINY
+            share = (b - a) / (r[e] - q[e] + same) * (1.0 - same) + same * (
+                1.0 - p[4, e] * (q[e] + r[e] < 0.0))
+            q[e] = 0.5 * p[0, e] * (a + b) * share
     else:
-        turned(_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, VECTORS, y),
-               kinds.turns, kinds.turns)
+        for e in indices(q.size):
+            q[e] = p[1, e] * (1.0 - p[4, e] * (q[e] < 0.0)) * (
+                g[0, e] * v[0, e] + g[1, e] * v[1, e] + g[2, e] * v[2, e] + g[3, e] * v[3, e])
+    for i in range(4):
+        for e in indices(q.size):
+            f[i, e] = q[e] * g[i, e]
+    if what == ELASTIC:
+        return
+    p, d = _part(kinds, DRAG, p), _part(kinds, DRAG, d)
+    v, f = _part(kinds, DRAG, v), _part(kinds, DRAG, f)
+    for e in indices(p.shape[1]):
+        size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
+        x, z = d[2, e] / size, d[3, e] / size
+        along, across = v[0, e] * x + v[1, e] * z, v[1, e] * x - v[0, e] * z
+        a, b = p[1, e] * np.abs(along) * along, p[0, e] * np.abs(across) * across
+        f[0, e], f[1, e] = a * x - b * z, a * z + b * x
 
 
 @source
@@ -516,18 +477,14 @@ def mean_slopes(kinds, y0, y1):
     """Means of the derivatives of coordinates by the vectors, (4, n): times the change of these
     the change of the coordinates. For equal vectors, which may be one array, the derivatives."""
     g = np.zeros((4, kinds.number))
-    flat = g.reshape(g.size)
-    a, b, f = (_part(kinds, SPRING, VECTORS, y0), _part(kinds, SPRING, VECTORS, y1),
-               _part(kinds, SPRING, VECTORS, flat))
+    a, b, f = _part(kinds, SPRING, y0), _part(kinds, SPRING, y1), _part(kinds, SPRING, g)
     for e in indices(f.shape[1]):
         c = 1.0 / (distance(a, e) + distance(b, e))
         f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
-    a, b, f = (_part(kinds, TORSION, VECTORS, y0), _part(kinds, TORSION, VECTORS, y1),
-               _part(kinds, TORSION, VECTORS, flat))
+    a, b, f = _part(kinds, TORSION, y0), _part(kinds, TORSION, y1), _part(kinds, TORSION, g)
     if f.shape[1] > 0:
         mean_turning(a, b, f)
-    p, f = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
-            _part(kinds, FOUNDATION, VECTORS, flat))
+    p, f = _part(kinds, FOUNDATION, kinds.numbers), _part(kinds, FOUNDATION, g)
     for e in indices(f.shape[1]):
         f[0, e], f[1, e] = p[2, e], p[3, e]
     return g
@@ -538,7 +495,7 @@ def add_bends(kinds, y, g, T, D):
     """Add T (n,) times the second derivatives of coordinates with derivatives g; (i, j) at 4 i + j.
     """
     _, d, c = _of(kinds, SPRING, y, T)
-    h, s = g[:, :c.size], _part(kinds, SPRING, BLOCK, D)
+    h, s = g[:, :c.size], _part(kinds, SPRING, D)
     for e in indices(c.size):
         k = c[e] / distance(d, e)
         s[0, e] += k * h[1, e] * h[1, e]
@@ -546,7 +503,7 @@ def add_bends(kinds, y, g, T, D):
         s[1, e] -= k * h[0, e] * h[1, e]
         s[4, e] -= k * h[0, e] * h[1, e]
     _, d, c = _of(kinds, TORSION, y, T)
-    s = _part(kinds, TORSION, BLOCK, D)
+    s = _part(kinds, TORSION, D)
     for k in range(2):  # that of the angle of d, and minus that of e
         for e in indices(c.size):
             x, z = d[2 * k, e], d[2 * k + 1, e]
@@ -558,48 +515,9 @@ def add_bends(kinds, y, g, T, D):
 
 
 @source
-def elastic(kinds, y0, y1, F):
-    """Elastic forces of the kinds, means between two states, which may be equal."""
-    p, f, g = _table(kinds, NUMBERS, kinds.numbers), _table(kinds, VECTORS, F), mean_slopes(
-        kinds, y0, y1)
-    q, r = coordinates(kinds, y0), coordinates(kinds, y1)
-    for e in indices(q.size):  # (V1 - V0) / (q1 - q0), V = k q^2 / 2 or zero for q < 0
-        a, b = q[e] * (1.0 - p[4, e] * (q[e] < 0.0)), r[e] * (1.0 - p[4, e] * (r[e] < 0.0))
-        same = np.abs(r[e] - q[e]) < TINY
-        share = (b - a) / (r[e] - q[e] + same) * (1.0 - same) + same * (
-            1.0 - p[4, e] * (q[e] + r[e] < 0.0))
-        q[e] = 0.5 * p[0, e] * (a + b) * share
-    for i in range(4):
-        for e in indices(q.size):
-            f[i, e] = q[e] * g[i, e]
-
-
-@source
-def resisting(kinds, y, w, F):
-    """Velocity-dependent forces of the kinds for rates w."""
-    p, v, f = (_table(kinds, NUMBERS, kinds.numbers), _table(kinds, VECTORS, w),
-               _table(kinds, VECTORS, F))
-    q, g = coordinates(kinds, y), mean_slopes(kinds, y, y)
-    for e in indices(q.size):
-        q[e] = p[1, e] * (1.0 - p[4, e] * (q[e] < 0.0)) * (
-            g[0, e] * v[0, e] + g[1, e] * v[1, e] + g[2, e] * v[2, e] + g[3, e] * v[3, e])
-    for i in range(4):
-        for e in indices(q.size):
-            f[i, e] = q[e] * g[i, e]
-    p, d, v, f = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, VECTORS, y),
-                  _part(kinds, DRAG, VECTORS, w), _part(kinds, DRAG, VECTORS, F))
-    for e in indices(p.shape[1]):
-        size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
-        x, z = d[2, e] / size, d[3, e] / size
-        along, across = v[0, e] * x + v[1, e] * z, v[1, e] * x - v[0, e] * z
-        a, b = p[1, e] * np.abs(along) * along, p[0, e] * np.abs(across) * across
-        f[0, e], f[1, e] = a * x - b * z, a * z + b * x
-
-
-@source
 def derivatives(kinds, y, w, factor, D):
-    """Derivatives of forces, and factor times those of ``resisting`` by w; (i, j) at 4 i + j."""
-    p, s, c = _table(kinds, NUMBERS, kinds.numbers), _table(kinds, BLOCK, D), np.empty(kinds.number)
+    """Derivatives of forces, and factor times those of resisting ones by w; (i, j) at 4 i + j."""
+    p, s, c = kinds.numbers, D, np.empty(kinds.number)
     q, g = coordinates(kinds, y), mean_slopes(kinds, y, y)
     for e in indices(q.size):
         c[e] = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * (q[e] < 0.0))
@@ -609,8 +527,8 @@ def derivatives(kinds, y, w, factor, D):
             for e in indices(q.size):
                 s[4 * i + j, e] = c[e] * g[i, e] * g[j, e]
     add_bends(kinds, y, g, q, D)
-    p, d, v, s = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, VECTORS, y),
-                  _part(kinds, DRAG, VECTORS, w), _part(kinds, DRAG, BLOCK, D))
+    p, d = _part(kinds, DRAG, kinds.numbers), _part(kinds, DRAG, y)
+    v, s = _part(kinds, DRAG, w), _part(kinds, DRAG, D)
     for e in indices(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
@@ -618,9 +536,3 @@ def derivatives(kinds, y, w, factor, D):
         b = 2.0 * factor * p[0, e] * np.abs(v[1, e] * x - v[0, e] * z)
         s[0, e], s[5, e] = a * x * x + b * z * z, a * z * z + b * x * x
         s[1, e], s[4, e] = (a - b) * x * z, (a - b) * x * z
-
-
-def potential(tables: ForceTables, y: np.ndarray) -> float:
-    """Potentials of the kinds at vectors y, shape (rows,)."""
-    q, p = coordinates(kinds_of(tables), y), _table(tables, NUMBERS, tables.numbers)
-    return float(0.5 * np.sum(p[0] * q**2 * (1.0 - p[4] * (q < 0.0))))

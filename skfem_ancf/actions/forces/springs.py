@@ -18,8 +18,8 @@ from ..loads import EndMoment
 from ..places import GROUND, Vector, both_of, named_place, point, section
 from ..symbols import Symbol, faces_of, middle
 from .base import ForceElement, KernelElement
-from .kernels import (BLOCK, DRAG, FOUNDATION, KINDS, SPRING, TORSION, VECTORS, Kinds, add_bends,
-                      coordinates, mean_slopes)
+from .kernels import (DRAG, FOUNDATION, KINDS, SPRING, TORSION, Kinds, add_bends, coordinates,
+                      mean_slopes)
 
 # user-defined laws of springs and dashpots: force of elongation, angle or rate
 
@@ -182,18 +182,14 @@ class ElasticElement(ForceElement):
     def _alone(self, *places: Array) -> tuple[Any, ...]:
         """The tables of kernels for this element alone, and vectors for places of its links."""
         kinds = Kinds(1, (np.arange(KINDS + 1) > self._part.kind).astype(np.int64), np.array(
-            (0.0, 0.0, *self._part.numbers[2:])), np.array([self._last]))
-        return kinds, *(np.append(x, np.zeros(VECTORS - x.size)) for x in places)
+            (0.0, 0.0, *self._part.numbers[2:]))[:, None], np.array([self._last]))
+        return kinds, *(np.append(x, np.zeros(4 - x.size))[:, None] for x in places)
 
     def coordinate(self, x: Array) -> tuple[float, Array]:
         """q and its derivative by the links, (n, 2)."""
         kinds, y = self._alone(x)
         return (float(coordinates(kinds, y)[0]),
                 mean_slopes(kinds, y, y).reshape(2, 2)[:len(x)])
-
-    def mean_slope(self, x: Array, y: Array) -> Array:
-        """G (n, 2) with ``G . (y - x) = q(y) - q(x)``."""
-        return mean_slopes(*self._alone(x, y)).reshape(2, 2)[:len(x)]
 
     def parts(self) -> list[KernelElement] | None:
         return None if isinstance(self.k, Law) or isinstance(self.damping, Law) else [self._part]
@@ -203,11 +199,6 @@ class ElasticElement(ForceElement):
         q, g = self.coordinate(x)
         return float(self.k(q) + self.damping(float(np.sum(g * v))))
 
-    def rate(self, x: Array) -> Array:
-        """Derivative of the amount at rest by the links, (n, 2)."""
-        q, g = self.coordinate(x)
-        return self.k.slope(q, self._scale) * g
-
     def force(self, x: Array, v: Array, t: float) -> Array:
         return -self.amount(x, v) * self.coordinate(x)[1]
 
@@ -216,13 +207,12 @@ class ElasticElement(ForceElement):
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         mean = self.k.mean(self.coordinate(x)[0], self.coordinate(y)[0])
-        return -mean * self.mean_slope(x, y)
+        return -mean * mean_slopes(*self._alone(x, y)).reshape(2, 2)[:len(x)]
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         (q, g), (kinds, y) = self.coordinate(x), self._alone(x)
-        D, n = np.zeros(BLOCK), len(x)
-        add_bends(kinds, y, np.append(g, np.zeros(VECTORS - g.size))[:, None],
-                  np.array([self.k(q)]), D)
+        D, n = np.zeros((16, 1)), len(x)
+        add_bends(kinds, y, np.append(g, np.zeros(4 - g.size))[:, None], np.array([self.k(q)]), D)
         return -self.k.slope(q, self._scale) * np.multiply.outer(g, g) - D.reshape(
             2, 2, 2, 2)[:n, :, :n]
 
@@ -363,7 +353,9 @@ def spring_force(elements: Sequence[ForceElement], which: Any, u: Array, v: Arra
     if base is None or not np.any(at(base)[0]):
         return spring.amount(x, np.array([link(v) - link.start for link in spring.links]))
     start = at(base)
-    return spring.amount(start, 0.0 * start) + float(np.sum(spring.rate(start) * (x - start)))
+    q, slope = spring.coordinate(start)
+    return spring.amount(start, 0.0 * start) + spring.k.slope(q, spring._scale) * float(
+        np.sum(slope * (x - start)))
 
 
 class Foundation(ForceElement):
@@ -395,23 +387,23 @@ class Foundation(ForceElement):
 
     def bind(self, layout: Layout) -> list[Vector]:
         beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
-        self._at, found = [], surfaces_of(beam, self.side, beam.element.facet_points)
+        self._parts, found = list[KernelElement](), surfaces_of(
+            beam, self.side, beam.element.facet_points)
         self.along = (beam, *groups_of(beam.mesh, found))
+        none, one_sided = Vector(np.zeros(2)), float(self.one_sided)
         for one in found:
             X = one.X if beam.has_sections else np.array([one.X[0], np.full(len(one.X[0]), 0.5)])
             for e, areas, normals in zip(one.elements.tolist(), one.areas,
                                          one.normals.transpose(1, 2, 0)):
                 for x, area, normal in zip(X.T, areas, normals):
                     dofs, weights = probe_reference(beam, e, x)
-                    self._at.append((Vector(np.zeros(2), dofs + first, weights), float(area),
-                                     normal))
-        return [place for place, _, _ in self._at]
+                    self._parts.append(KernelElement(
+                        FOUNDATION, Vector(np.zeros(2), dofs + first, weights), none,
+                        (self.k * area, self.damping * area, *normal, one_sided)))
+        return [part.d for part in self._parts]
 
     def parts(self) -> list[KernelElement]:
-        none, one = Vector(np.zeros(2)), float(self.one_sided)
-        return [KernelElement(FOUNDATION, place, none,
-                              (self.k * area, self.damping * area, n[0], n[1], one))
-                for place, area, n in self._at]
+        return self._parts
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         for at, normals, _ in faces_of(layout, layout.beam(self.beam), self.side):
@@ -463,21 +455,19 @@ class Drag(ForceElement):
         slopes, frame = beam_gradients(mesh, beam.element, X)
         every = np.arange(mesh.nelements)
         self.along = beam, [Facets(AXIS, every, every, xi)], ()
-        length = length * beam.across.outline(X)
-        self._at = []
+        q = 0.5 * self.density * w * length * beam.across.outline(X)
+        self._parts = list[KernelElement]()
         for e in range(mesh.nelements):
             for k, x in enumerate(X.T):
                 dofs, weights = probe_reference(beam, e, x)
-                place = Vector(np.zeros(2), dofs + first, weights)
-                slope = Vector(frame[0, e, k], dofs + first, slopes[0, e, k])
-                self._at.append((place, slope, float(w[k] * length[e, k])))
-        return [place for place, _, _ in self._at]
+                self._parts.append(KernelElement(
+                    DRAG, Vector(np.zeros(2), dofs + first, weights),
+                    Vector(frame[0, e, k], dofs + first, slopes[0, e, k]),
+                    (q[e, k] * self.normal, q[e, k] * self.tangential, 0.0, 0.0, 0.0)))
+        return [part.d for part in self._parts]
 
     def parts(self) -> list[KernelElement]:
-        q = 0.5 * self.density
-        return [KernelElement(DRAG, place, slope,
-                              (q * self.normal * ds, q * self.tangential * ds, 0.0, 0.0, 0.0))
-                for place, slope, ds in self._at]
+        return self._parts
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         yield Symbol("drag", (middle(layout, self.beam),), text="drag")

@@ -1,6 +1,6 @@
 """The force elements of a scene: tables of known kinds, and user-defined elements."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from copy import copy
 from typing import Any
 
@@ -11,12 +11,11 @@ from ...core import Array, constant
 from ..contact.contacts import NO_CONTACTS, Contacts, matched, take_over
 from ..contact.tables import HAS_ENTRIES, SAFE, SEARCHED, SEEN, clear_table, set_clear
 from ..bound import BoundForce, Remembering, is_like, positions, recalled
-from .base import KernelElement
 from .springs import TorsionalSpring
 from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, DERIVATIVES, DRAG, ELASTIC, ENTRIES, KINDS, NUMBERS, PUSHING,
-                      RESISTING, SETTLED, TORSION, TURNED, ForceTables, Rested, element_stiffness,
-                      kinds_of, of_kinds, potential, rests, vectors_of)
+                      RESISTING, SETTLED, TORSION, TURNED, ForceTables, Rested, coordinates,
+                      element_stiffness, kinds_of, of_kinds, rests, vectors_of)
 
 
 #: Relative size of forces of an item that are round-off.
@@ -35,7 +34,8 @@ class Forces:
     with places that differ by more than 1. ``symmetric``: all derivatives are symmetric.
     ``resists``: there are velocity-dependent forces. ``masses`` contribute to the mass matrix;
     ``contacts`` are the obstacles. ``clear`` and ``rested`` are tables of
-    :func:`~skfem_ancf.actions.forces.kernels.rests`.
+    :func:`~skfem_ancf.actions.forces.kernels.rests`. ``blocks`` are the numbers of the derivatives
+    of each element.
     """
 
     #: The vectors are ``start + B u``: the start, and the rows, DOFs and weights of B.
@@ -48,14 +48,6 @@ class Forces:
     _in_border = NONE > 0
     border_entries = _entries
     _border: Any = NONE, NONE
-    #: Of a scene without elements.
-    masses: Any = ()
-    elements = custom = changing = remembering = parts = _springs = _blocks = _slices = masses
-    _paired: Any = masses
-    rows = size = paired = 0
-    couples_far = resists = False
-    symmetric = True
-    contacts = Contacts((), 0)
     #: Entries of the last tangent of a step: rows, columns and values. Those of the last tangent of
     #: changing elements, and what they were computed from.
     kept: Any = NONE, NONE, np.zeros(0)
@@ -64,12 +56,9 @@ class Forces:
     def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
         self._N, self._bandwidth, self.border_rows = N, bandwidth, np.zeros((0, N))
-        if not elements:
-            self.clear, self.rested = np.zeros(SEEN + 2 * N), nowhere(N)
-            return
-        self.masses = [e for e in elements if e.mass_entries() is not None]
-        self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
-                         for e in elements]
+        self.masses: Any = [e for e in elements if e.mass_entries() is not None]
+        self.elements: Any = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
+                              for e in elements]
         self._sort()
         n = len(self.parts)
         # of each element its links, the rows of their components in the vectors (those of the parts
@@ -78,9 +67,9 @@ class Forces:
         for k, part in enumerate(self.parts):
             a, b = np.divmod(np.arange(16), 4) if part.kind == TORSION else FIRST
             blocks.append(((part.d, part.e), k + n * np.arange(4), a, b, k + n * (4 * a + b)))
-        self._blocks = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
+        self.blocks: list[Any] = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
         row, at = 4 * n, 16 * n
-        self._slices = []
+        self._slices = list[Any]()
         for element in self.custom:
             m = 2 * len(element.links)
             dense = element.entries is None
@@ -88,7 +77,7 @@ class Forces:
                 np.arange(m * m), m) if dense else element.entries
             numbers = at + np.arange(len(a))
             if not element.changing:
-                self._blocks.append(numbers.reshape(m, m) if dense else numbers)
+                self.blocks.append(numbers.reshape(m, m) if dense else numbers)
             self._slices.append((slice(row, row + m), slice(at, at + len(a))))
             blocks.append((element.links, row + np.arange(m), a, b, numbers))
             row, at = row + m, at + len(a)
@@ -103,7 +92,10 @@ class Forces:
         self._pair()
         self.clear, self.rested, u = clear_table(weights), nowhere(N), np.zeros(N)
         if self.changing:
-            set_clear(self.clear, u, 0.5 * SAFE * self._least_gap(u))
+            # of those that do not tell their gap none is known
+            gaps = [e.least_gap(u[at].reshape(-1, 2)) if hasattr(e, "least_gap") else 0.0
+                    for e, at in self.changing]
+            set_clear(self.clear, u, 0.5 * SAFE * min(gaps))
             self.clear[SEARCHED] = sum(pair.found[1] for pair in self.pairs)
         self.couples_far = bool(len(self.border_rows) or self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
@@ -117,8 +109,8 @@ class Forces:
 
     def _sort(self):
         """Sort elements into parts that the kernels know, by kind, and the user's, by pattern."""
-        parts: list[KernelElement] = []
-        self.custom, self.changing, self.remembering = [], [], []
+        parts = list[Any]()
+        self.custom, self.changing, self.remembering = list[Any](), list[Any](), list[Any]()
         for element in self.elements:
             found = element.parts()
             if found is not None:
@@ -202,7 +194,7 @@ class Forces:
         return ForceTables(
             start, at, of, weight, len(self.parts),
             np.searchsorted(kinds, np.arange(KINDS + 1)).astype(np.int64),
-            np.ascontiguousarray(numbers.T).ravel(), self.size,
+            np.ascontiguousarray(numbers.T), self.size,
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._border[0], self._border[1],
             handle if self.custom or self.changing else 0, self.contacts.tables,
@@ -239,17 +231,14 @@ class Forces:
 
     # values
 
-    def vectors(self, tables: ForceTables, u: Array) -> Array:
-        """Values of the vectors at u."""
-        y = np.empty(self.rows)
-        vectors_of(tables, u, 1.0, y)
-        return y
-
     def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
         """Potential of all elements; zero for those without one."""
-        y = self.vectors(tables, u)
+        y, p = np.empty(self.rows), tables.numbers
+        vectors_of(tables, u, 1.0, y)
+        q = coordinates(kinds_of(tables), y[:4 * tables.number].reshape(4, -1))
         self.recall()
-        return potential(tables, y) + self.contacts.potential(u, t) + sum(
+        return float(0.5 * np.sum(p[0] * q**2 * (1.0 - p[4] * (q < 0.0)))) + (
+            self.contacts.potential(u, t)) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.custom, self._slices)) + (
             0.0 if self._at_rest(u) else sum(
@@ -273,8 +262,9 @@ class Forces:
 
     def part_forces(self, tables: ForceTables, u: Array, v: Array) -> Array:
         """Resisting force on the first vector of each part, shape (2, parts)."""
-        n, y, w, out = len(self.parts), self.vectors(tables, u), np.empty(self.rows), np.zeros(
+        n, y, w, out = len(self.parts), np.empty(self.rows), np.empty(self.rows), np.zeros(
             (2, self.rows))
+        vectors_of(tables, u, 1.0, y)
         vectors_of(tables, v, 0.0, w)
         if n:
             kinds = kinds_of(tables)
@@ -295,15 +285,11 @@ class Forces:
         for spring, angle in zip(self._springs, self.contacts.turns):
             spring._last = float(angle)
 
-    def _angles(self, u: Array) -> Array:
-        """Angles of torsional springs at u, less than half a turn from the last ones; (k,)."""
-        self.recall()
-        return np.array([one.coordinate(np.array([link(u) for link in one.links]))[0]
-                         for one in self._springs])
-
     def settle(self, u0: Array, u: Array, t: float) -> float:
         """Update the history data at the end of an increment from u0 to u; returns lost work."""
-        self.follow(u)
+        self.recall()  # the angles are less than half a turn from the last ones
+        self.contacts.turns[:] = [one.coordinate(np.array([link(u) for link in one.links]))[0]
+                                  for one in self._springs]
         return self.contacts.settle(u, t) + sum(
             item.settle(u0, u, t) for item in self._at_work(u0, u))
 
@@ -325,21 +311,12 @@ class Forces:
             turns[k] = other.contacts.turns[j] + one._start - spring._start
         return take_over(self.contacts, other.contacts, u, t) or bool(items or springs)
 
-    def follow(self, u: Array) -> None:
-        """Keep the angles of torsional springs at u."""
-        self.contacts.turns[:] = self._angles(u)
-
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
         """Derivatives by the vectors, shape (size,)."""
         D = np.zeros(self.size)
         element_stiffness(tables, t, u, v, factor, D)
         return D
-
-    def stiffness_norms(self, tables: ForceTables, u: Array) -> Array:
-        """Largest eigenvalue of the stiffness of each element, shape (k,)."""
-        D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
-        return np.array([np.linalg.norm(D[numbers], 2) for numbers in self._blocks])
 
     def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
                 factor: float) -> tuple[Array, Array, Array]:
@@ -401,41 +378,25 @@ class Forces:
         moved = np.max(weights * np.abs(np.diff(u, axis=0).view(complex)), axis=2).sum(axis=0)
         return moved >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 
-    def looks(self, u: Array, t: float, start: Array | None) -> Iterator[tuple[Any, Any]]:
-        """Elements of bodies that touch each other, with what their ``look`` returns."""
-        for element, at in self.changing:
-            if hasattr(element, "look"):
-                before = None if start is None else start[at].reshape(-1, 2)
-                yield element, element.look(u[at].reshape(-1, 2), t, element.history, before)
-
-    def _of_pattern(self, what, t, factor, u, w, out):
-        """Evaluate changing elements at displacements, for :meth:`add_custom`."""
-        if what == ENTRIES:
-            i, j, values = self.changing_entries(t, u, u if np.array_equal(u, w) else w)
-            self.kept, self.clear[HAS_ENTRIES] = (i, j, factor * values), float(len(i) > 0)
-            return
-        if what == ALONG_PUSHING:
-            i, j, values = self.changing_entries(t, u, u)
-            out[0] += values @ (w[i] * w[j])
-        for element, at in self.changing:
-            x, y = (z[at].reshape(-1, 2) for z in (u, w))
-            if what == ALONG_PUSHING:
-                out[1] = max(out[1], element.search_intervals(x, x + y))
-            elif not hasattr(element, "broad_search"):
-                out[at] -= np.ravel(element.force(x, 0.0 * x, t))
-
-    def _least_gap(self, u):
-        """The least gap of changing elements; 0 for unknown."""
-        return min(element.least_gap(u[at].reshape(-1, 2)) if hasattr(element, "least_gap") else 0.0
-                   for element, at in self.changing)
-
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
         """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.call_custom`."""
         # a and b are positions or, for SETTLED, a step's start and its end with velocities; from
-        # PUSHING on displacements (N,), see :meth:`_of_pattern`
+        # PUSHING on displacements (N,), of elements with a pattern that changes alone
+        if what == ENTRIES:
+            i, j, values = self.changing_entries(t, a, a if np.array_equal(a, b) else b)
+            self.kept, self.clear[HAS_ENTRIES] = (i, j, factor * values), float(len(i) > 0)
+            return
+        if what == ALONG_PUSHING:
+            i, j, values = self.changing_entries(t, a, a)
+            out[0] += values @ (b[i] * b[j])
         if what >= PUSHING:
-            self._of_pattern(what, t, factor, a, b, out)
+            for element, at in self.changing:
+                x, y = (u[at].reshape(-1, 2) for u in (a, b))
+                if what == ALONG_PUSHING:
+                    out[1] = max(out[1], element.search_intervals(x, x + y))
+                elif not hasattr(element, "broad_search"):
+                    out[at] -= np.ravel(element.force(x, 0.0 * x, t))
             return
         self.recall()
         for element, (rows, places) in zip(self.custom, self._slices):
@@ -467,5 +428,5 @@ def nowhere(N: int) -> Rested:
 
 #: For scenes without force elements.
 NO_FORCES = constant(ForceTables(
-    _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS, 0,
-    _X, 0, _I, nowhere(0)))
+    _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), np.zeros((NUMBERS, 0)), 0, _I, _I, _X, _I,
+    _I, 0, NO_CONTACTS, 0, _X, 0, _I, nowhere(0)))

@@ -84,7 +84,13 @@ def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
     if not (forces.contacts.obstacles or forces.changing):
         raise InputError("the scene has no contact: scene.obstacle(Circle((0, -1), 0.5)) adds an "
                          "obstacle, scene.contact('all') that of its members with each other")
-    member = None if on is None else _number(state.system.members, on)
+    members, member = state.system.members, None
+    if on is not None:
+        names = [getattr(one, "name", None) for one in members]
+        known_as = [k for k, one in enumerate(members) if one is on or names[k] == on]
+        if isinstance(on, str) and not known_as:
+            raise NameUnknown("member", on, [name or k for k, name in enumerate(names)])
+        member = known_as[0] if known_as else require_index("on", on, len(members))
     if isinstance(which, Item):
         known = [e for e in forces.elements if e.same(which) and (e.groups or hasattr(e, "look"))]
         refuse(not known, "{!r} is no obstacle and no contact of this scene", which)
@@ -95,23 +101,12 @@ def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
                                                          len(forces.contacts.obstacles))]]
     else:
         known = forces.elements
-    found = [*_of_obstacles(state, start, span, known, member),
-             *_of_bodies(state, forces, start, known, member)]
+    found = [*_touching(state, forces, start, span, known, member)]
     *parts, nearest = zip(*found) if found else (
         *((np.zeros(shape),) for shape in ((2, 0), (2, 0), (0,), (0,))), (np.zeros(0, bool),),
         (np.inf,))
     places, force, pressure, gap, sticks = (np.concatenate(x, axis=-1) for x in parts)
     return Contact(places, force, pressure, gap, min(nearest), sticks)
-
-
-def _number(members, which):
-    for k, one in enumerate(members):
-        if one is which or (which is not None and getattr(one, "name", None) == which):
-            return k
-    if isinstance(which, str):
-        raise NameUnknown("member", which, [getattr(one, "name", None) or k
-                                            for k, one in enumerate(members)])
-    return require_index("on", which, len(members))
 
 
 def _step_of(state):
@@ -134,8 +129,9 @@ def _pushes(state, start, span):
     return contacts, zip(contacts.groups, found)
 
 
-def _of_obstacles(state, start, span, known, member):
-    """Contact points, forces, pressures, gaps, sticking and the least gap of each group."""
+def _touching(state, forces, start, span, known, member):
+    """Contact points, forces, pressures, gaps, sticking and the least gap of each group of points
+    of an obstacle, then of bodies that touch each other, on both sides."""
     contacts, pushes = _pushes(state, start, span)
     for (_, group), (k, x, force, pressure, gap) in pushes:
         one, first = contacts.obstacles[k], int(group.first[0])
@@ -150,14 +146,12 @@ def _of_obstacles(state, start, span, known, member):
         touch = pressure > 0.0
         yield (x[:, touch], force[:, touch], pressure[touch], gap[touch], sticks[touch],
                float(gap.min()))
-
-
-def _of_bodies(state, forces, start, known, member):
-    """The same of bodies that touch each other, on both sides."""
-    for element, found in forces.looks(np.array(state.u), state._time, start):
-        if not any(element.same(other) for other in known):
+    for element, at in forces.changing:
+        if not hasattr(element, "look") or not any(element.same(other) for other in known):
             continue
-        x, y, force, pressure, gap, sticks, own, other = found
+        x, y, force, pressure, gap, sticks, own, other = element.look(
+            np.array(state.u)[at].reshape(-1, 2), state._time, element.history,
+            None if start is None else start[at].reshape(-1, 2))
         both = [np.append(x, y, axis=1), np.append(force, -force, axis=1),
                 *(np.tile(value, 2) for value in (pressure, gap, sticks))]
         here = np.ones(2 * len(gap), bool) if member is None else np.append(own, other) == member
@@ -209,7 +203,24 @@ def _balanced(group, pressure):
     ends[1, -2 * m:] = ends[0, -2 * m:]
     nodes = np.unique(ends * 4 + side, return_inverse=True)[1].reshape(2, -1)
     touching = pressure > 0.0
-    moved = _corners(group, touching)
+    # A corner is a point of bottom or top and points of an end. A face that touches only there
+    # faces away from the obstacle: its force is on the other one. So points at corners belong with
+    # a point each of the face there that touches more, (2, k).
+    last, places, pairs = (n - 2) * m, np.vstack([group.starts[:2], group.offsets]), list[Any]()
+    for end, element, first in ((last, 0, 0), (last + m, last - m, -1)):
+        ends_of = np.arange(end, end + m)
+        for face in (element, element + m // 2):
+            sides = np.arange(face, face + m // 2)
+            corner = sides[first]
+            apart = np.abs(places[:, ends_of] - places[:, [corner]]).max(axis=0)
+            near = apart < 1e-6 * group.height
+            rest = [group.areas[some[touching[some]]].sum() for some in (
+                sides[sides != corner], ends_of[~near])]
+            if rest[0] < rest[1]:
+                pairs.append((corner, ends_of[~near][0]))
+            elif rest[0] > rest[1]:
+                pairs += [(i, corner) for i in ends_of[near]]
+    moved = np.array(pairs, dtype=int).reshape(-1, 2).T
     nodes[:, moved[0]] = nodes[:, moved[1]]
     closed = touching.copy()
     for k in (0, 1):
@@ -224,25 +235,3 @@ def _balanced(group, pressure):
     xi = _along_elements(group)
     xi[moved[0]] = xi[moved[1]]
     return np.where(touching, (1.0 - xi) * mean[0] + xi * mean[1], 0.0)
-
-
-def _corners(group, touching):
-    """Points at corners, and a point each of the face there that touches more; (2, k)."""
-    # A corner is a point of bottom or top and points of an end. A face that touches only there
-    # faces away from the obstacle: its force is on the other one.
-    m, last = group.points, (group.elements - 2) * group.points
-    places, pairs = np.vstack([group.starts[:2], group.offsets]), []
-    for end, element, first in ((last, 0, 0), (last + m, last - m, -1)):
-        ends = np.arange(end, end + m)
-        for side in (element, element + m // 2):
-            sides = np.arange(side, side + m // 2)
-            corner = sides[first]
-            apart = np.abs(places[:, ends] - places[:, [corner]]).max(axis=0)
-            near = apart < 1e-6 * group.height
-            rest = [group.areas[face[touching[face]]].sum() for face in (
-                sides[sides != corner], ends[~near])]
-            if rest[0] < rest[1]:
-                pairs.append((corner, ends[~near][0]))
-            elif rest[0] > rest[1]:
-                pairs += [(i, corner) for i in ends[near]]
-    return np.array(pairs, dtype=int).reshape(-1, 2).T

@@ -14,7 +14,6 @@ from ..forces.base import ForceElement, KernelElement
 from ..places import Vector
 from .shapes import Shape
 
-METHODS = ("penalty", "augmented")
 #: Least length of indentation of a strip under a point force, relative to its extent: meshes do not
 #: resolve shorter ones, and Newton's method fails.
 SPREAD = 1.0 / 200.0
@@ -104,7 +103,7 @@ class Obstacle(ForceElement):
         self.friction = require_not_negative("friction", friction, False)
         self.damping = require_not_negative("damping", damping)
         self.penalty = None if stiffness is None else require_positive("stiffness", stiffness)
-        self.method = require_option("method", method, METHODS)
+        self.method = require_option("method", method, ("penalty", "augmented"))
         self.points = None if points is None else require_integer("points", points, 2, MOST)
         self.position, self.angle = position, angle
         for name, function in (("position", position), ("angle", angle)):
@@ -179,8 +178,25 @@ class Obstacle(ForceElement):
 
     def _group(self, beam, first):
         """Points of bottom, top and both ends; an end counts as an element."""
-        mesh, (xi, along) = beam.mesh, self._along(beam)
-        m, h = 2 * len(xi), mesh.height
+        mesh, h = beam.mesh, beam.mesh.height
+        rule = lobatto(self.points or beam.element.axis_degree + 2)
+        bend, longest = self.shape.bend, float(mesh.lengths.max())
+        apart = longest * float(np.max(np.diff(rule[0])))
+        if self.points is None and bend > 0.0:
+            wanted = np.ceil(apart / min(np.sqrt(8.0 * SINK * bend * h), RIPPLE * bend))
+            pieces = int(np.clip(wanted, 1, MOST // len(rule[0])))
+            (x, w), apart = rule, apart / pieces
+            places = np.add.outer(np.arange(pieces), x)[:, :-1].ravel() / pieces
+            weights = np.tile(w[:-1], pieces) / pieces
+            weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet
+            rule = np.append(places, 1.0), np.append(weights, w[-1] / pieces)
+        if apart > 2.0 * bend > 0.0:
+            warn(
+                f"{self!r} has a radius of {bend:.4g}, and the points of {beam!r} that touch it "
+                f"are {apart:.4g} apart: it passes between them unseen. Use shorter elements where "
+                "it is, or a larger points=", ModelWarning)
+        xi, along = rule
+        m = 2 * len(xi)
         eta, across = lobatto(ACROSS)  # as many points as an element has: some are shared
         which = np.arange(m) % ACROSS
         eta, across = eta[which], across[which] / np.bincount(which)[which]
@@ -202,23 +218,6 @@ class Obstacle(ForceElement):
         return Group(nodes, weights, slopes, areas, offsets, starts, mesh.nelements + 2, m,
                      np.inf if self.shape.inner == np.inf else THROUGH * min(h, self.shape.inner),
                      h, law, factor)
-
-    def _along(self, beam):
-        """Points and weights along the elements of a beam."""
-        rule = lobatto(self.points or beam.element.axis_degree + 2)
-        bend, longest = self.shape.bend, float(beam.mesh.lengths.max())
-        apart = longest * float(np.max(np.diff(rule[0])))
-        if self.points is None and bend > 0.0:
-            wanted = np.ceil(apart / min(np.sqrt(8.0 * SINK * bend * beam.mesh.height),
-                                         RIPPLE * bend))
-            pieces = int(np.clip(wanted, 1, MOST // len(rule[0])))
-            rule, apart = _repeated(*rule, pieces), apart / pieces
-        if apart > 2.0 * bend > 0.0:
-            warn(
-                f"{self!r} has a radius of {bend:.4g}, and the points of {beam!r} that touch it "
-                f"are {apart:.4g} apart: it passes between them unseen. Use shorter elements where "
-                "it is, or a larger points=", ModelWarning)
-        return rule
 
     def _points(self, beam, first, X, w, tind):
         """Data of a Group for points of both sides of all elements, or of an end."""
@@ -273,11 +272,3 @@ def lobatto(n: int) -> tuple[Array, Array]:
     x = gauss_lobatto(n)
     P = np.polynomial.legendre.Legendre.basis(n - 1)(x)
     return 0.5 * (x + 1.0), 1.0 / (n * (n - 1) * P**2)
-
-
-def _repeated(x, w, pieces):
-    """A rule with end points, repeated on equal intervals of [0, 1]."""
-    points = np.add.outer(np.arange(pieces), x)[:, :-1].ravel() / pieces
-    weights = np.tile(w[:-1], pieces) / pieces
-    weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet
-    return np.append(points, 1.0), np.append(weights, w[-1] / pieces)

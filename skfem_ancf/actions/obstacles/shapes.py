@@ -9,7 +9,7 @@ import numpy as np
 from ...core import (Array, ArrayLike, CallbackError, Immutable, ask, refuse, refuse_any,
                      require_direction, require_finite, require_flag, require_function,
                      require_not_negative, require_positive, warnings_as_errors)
-from ..contact.gap import outline
+from ..contact.kernels import outline
 from ..contact.tables import CUSTOM, OUTLINE
 from ..item import takes
 
@@ -24,14 +24,6 @@ def circle(center: Array, radius: float, n: int) -> tuple[Array, Array]:
     angle, k = 2.0 * np.pi * np.arange(n) / n, np.arange(n)
     points = center[:, None] + radius * np.array([np.cos(angle), np.sin(angle)])
     return points, np.column_stack([k, np.roll(k, -1)])
-
-
-def clipped(point: Array, normal: Array, box: Array) -> tuple[Array, Array]:
-    """A line as one segment near a box."""
-    along = np.array([normal[1], -normal[0]])
-    middle, half = box.mean(axis=1), 0.5 * np.hypot(*(box[:, 1] - box[:, 0]))
-    foot = point + ((middle - point) @ along) * along
-    return np.array([foot - half * along, foot + half * along]).T, np.array([[0, 1]])
 
 
 def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Array]:
@@ -188,7 +180,12 @@ class Line(Outline):
         self.numbers = np.array([0.0, -FAR, FAR, *self.point, -q, p, 1.0])
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        return clipped(self.point, self._unit, box)
+        # one segment near the box
+        p, q = self._unit
+        along, middle, half = np.array([q, -p]), box.mean(axis=1), 0.5 * np.hypot(
+            *(box[:, 1] - box[:, 0]))
+        foot = self.point + ((middle - self.point) @ along) * along
+        return np.array([foot - half * along, foot + half * along]).T, np.array([[0, 1]])
 
     def __repr__(self) -> str:
         return f"<Line at {_pair(self.point)}, normal {_pair(self.normal)}>"
@@ -281,7 +278,15 @@ class Polygon(Outline):
         sides = np.where(_cross(before, edges) >= 0.0, 1.0, -1.0)
         self.numbers = np.append([self.radius, 0.0, 1.0], np.column_stack([corners, edges, sides]))
         side = -1.0 if self.hollow else 1.0
-        inner = _thin(corners, edges, side) + side * self.radius
+        # half the least distance through the solid from the middle of an edge to another edge
+        middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
+        apart = corners[None] - middle[:, None]  # corner_j + b edge_j = middle_i + a normal_i
+        det = _cross(normal[:, None], edges[None])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            a, b = _cross(apart, edges[None]) / det, _cross(apart, normal[:, None]) / det
+        met = (a > 1e-9) & (b >= 0.0) & (b <= 1.0)
+        inner = side * self.radius + 0.5 * float(np.min(np.where(
+            met, a * np.hypot(*normal.T)[:, None], np.inf)))
         self.inner = inner if inner > 0.0 else np.inf
 
     def landmarks(self) -> Array:
@@ -301,17 +306,6 @@ class Polygon(Outline):
 
 def _pair(x):
     return f"({x[0]:g}, {x[1]:g})"
-
-
-def _thin(corners, edges, side):
-    """Half the least distance through the solid from the middle of an edge to another edge."""
-    middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
-    apart = corners[None] - middle[:, None]  # corner_j + b edge_j = middle_i + a normal_i
-    det = _cross(normal[:, None], edges[None])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a, b = _cross(apart, edges[None]) / det, _cross(apart, normal[:, None]) / det
-    met = (a > 1e-9) & (b >= 0.0) & (b <= 1.0)
-    return 0.5 * float(np.min(np.where(met, a * np.hypot(*normal.T)[:, None], np.inf)))
 
 
 def _cross(a, b):
@@ -386,14 +380,10 @@ class SignedDistance(Shape):
         """Values of one of the functions, with a check of the shape."""
         more = (t,) if self._timed[name] else ()
         value = ask(f"{name} of a SignedDistance", getattr(self, name), x[0], x[1], *more)
-        value = np.asarray(value)
-        if name == "f" and value.ndim == 0 and x[0].ndim == 0:
-            pass
-        else:
-            refuse(value.shape != (*rows, *x.shape[1:]), "{}(x, y) of a SignedDistance must return "
-                   "the shape {} for x and y of the shape {}, got {}: write it for arrays, as "
-                   "np.hypot(x, y) - 1.0", name, (*rows, *x.shape[1:]), x.shape[1:], value.shape,
-                   error=CallbackError)
+        value, shape = np.asarray(value), (*rows, *x.shape[1:])
+        refuse(value.shape != shape, "{}(x, y) of a SignedDistance must return the shape {} for x "
+               "and y of the shape {}, got {}: write it for arrays, as np.hypot(x, y) - 1.0", name,
+               shape, x.shape[1:], value.shape, error=CallbackError)
         refuse(value.dtype.kind not in "fiuc" or not np.all(np.isfinite(value)), "{}(x, y) of a "
                "SignedDistance must be finite numbers, got {!r}", name, value, error=CallbackError)
         return value
@@ -405,16 +395,15 @@ class SignedDistance(Shape):
         """Gradient at points, shape (2, n)."""
         if self.gradient is not None:
             return self._asked("gradient", x, t, (2,))
-        return self._complex_steps(x, t) if self._by_steps else self._differences(x, t)
+        return self._slope_by_steps(x, t, self._by_steps)
 
-    def _complex_steps(self, x, t):
-        return np.array([np.imag(self._asked("f", x + 1e-30j * e, t)) / 1e-30
-                         for e in np.eye(2)[:, :, None]])
-
-    def _differences(self, x, t):
-        step = STEP * self._scale
+    def _slope_by_steps(self, x, t, imaginary):
+        """The same by complex steps or by differences."""
+        units, step = np.eye(2)[:, :, None], STEP * self._scale
+        if imaginary:
+            return np.array([np.imag(self._asked("f", x + 1e-30j * e, t)) / 1e-30 for e in units])
         return np.array([(self._asked("f", x + step * e, t) - self._asked("f", x - step * e, t))
-                         / (2.0 * step) for e in np.eye(2)[:, :, None]])
+                         / (2.0 * step) for e in units])
 
     def derivatives(self, x: Array, t: float) -> Array:
         """Distance, gradient and second derivatives xx, xy, yy, shape (6, n)."""
@@ -432,7 +421,7 @@ class SignedDistance(Shape):
     def fitted(self, x: Array, scale: float) -> "SignedDistance":
         made = self._thawed()
         made._scale, made._by_steps = scale, False
-        rough = made._differences(x, 0.0)
+        rough = made._slope_by_steps(x, 0.0, False)
         steep = np.hypot(*rough)
         worst = int(np.argmax(steep))
         refuse(steep[worst] > 1.0 + STEEP, "f(x, y) of a SignedDistance must be a distance, whose "
@@ -441,8 +430,8 @@ class SignedDistance(Shape):
         if made.gradient is None:
             with suppress(CallbackError, TypeError, ValueError, _COMPLEX), (
                     warnings_as_errors(_COMPLEX)):
-                made._by_steps = bool(np.allclose(made._complex_steps(x, 0.0), rough, rtol=0.0,
-                                                  atol=1e-4))
+                made._by_steps = bool(np.allclose(made._slope_by_steps(x, 0.0, True), rough,
+                                                  rtol=0.0, atol=1e-4))
         else:
             off = np.abs(made._slope(x, 0.0) - rough).max()
             refuse(off > 1e-3, "gradient(x, y) of a SignedDistance is not that of f: they differ "

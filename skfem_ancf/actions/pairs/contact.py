@@ -113,31 +113,7 @@ class BodyContact(ForceElement):
     # binding
 
     def bind(self, layout: Layout) -> list[Vector]:
-        used, allowed = self._members(layout)
-        beams = [k for k in used if isinstance(layout.members[k], Beam)]
-        self._compiled = all(layout.members[k].compiled for k in beams)
-        origin = complex(*np.mean([layout.members[k].origin for k in used], axis=0))
-        f = _widened(facets_of(layout, used, origin), beams)
-        self.dofs = np.unique(f.dofs)
-        sharp = f._replace(dofs=np.searchsorted(self.dofs, f.dofs))
-        f = rounded(sharp, ROUND * float(np.min(f.heights)))
-        surfaces = Surfaces(f)
-        if not np.isfinite(f.stiffness).any() and self.penalty is None:
-            raise InputError(f"{self!r} has no beam, whose modulus would give a stiffness: give "
-                             "stiffness=, a pressure per penetration")
-        solids = [(k, _inside(layout.members[k], origin)) for k in used if k not in beams]
-        places = np.isin(self.dofs, np.concatenate([layout.offset(k) // 2 + np.flatnonzero(
-            layout.members[k].rigid_motions()[::2, 0]) for k in used]))
-        self.broad_search = Search(surfaces, sharp, allowed, solids,
-                                   (self.penalty, WIDTH, self.friction), places)
-        self._surfaces, self.origin = surfaces, origin
-        self.weights = self.broad_search.weights
-        self.near = NEAR * self.broad_search.height
-        self._begin(layout)
-        return [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in self.dofs]
-
-    def _members(self, layout):
-        """Numbers of the members, and which of all may touch."""
+        # which members may touch, and their numbers
         n = len(layout.members)
         a, b = _numbers(layout, self.a), _numbers(layout, "all" if self.b is None else self.b)
         allowed = np.zeros((n, n), bool)
@@ -147,7 +123,35 @@ class BodyContact(ForceElement):
             allowed[k, k] = self.self_contact and k in a and isinstance(layout.members[k], Beam)
         refuse(not allowed.any(), "{!r} has nothing to touch: give self_contact=True for the "
                "contact of a beam with itself, or two members, as scene.contact(0, 1)", self)
-        return np.flatnonzero(allowed.any(axis=0)).tolist(), allowed
+        used = np.flatnonzero(allowed.any(axis=0)).tolist()
+        beams = [k for k in used if isinstance(layout.members[k], Beam)]
+        self._compiled = all(layout.members[k].compiled for k in beams)
+        origin = complex(*np.mean([layout.members[k].origin for k in used], axis=0))
+        f = facets_of(layout, used, origin)
+        # areas on bodies and domains are those of the mean width of beams
+        of_beams = np.isin(f.members, beams)
+        faces = of_beams & (f.spans > 0.0)
+        if faces.any():
+            width = np.sum(f.areas[faces[f.of]]) / np.sum(f.lengths[faces])
+            f = f._replace(areas=f.areas * np.where(of_beams[f.of], 1.0, width))
+        self.dofs = np.unique(f.dofs)
+        sharp = f._replace(dofs=np.searchsorted(self.dofs, f.dofs))
+        f = rounded(sharp, ROUND * float(np.min(f.heights)))
+        surfaces = Surfaces(f)
+        if not np.isfinite(f.stiffness).any() and self.penalty is None:
+            raise InputError(f"{self!r} has no beam, whose modulus would give a stiffness: give "
+                             "stiffness=, a pressure per penetration")
+        solids = [(k, lambda x, member=layout.members[k]: member.contains(_plane(x + origin)))
+                  for k in used if k not in beams]
+        places = np.isin(self.dofs, np.concatenate([layout.offset(k) // 2 + np.flatnonzero(
+            layout.members[k].rigid_motions()[::2, 0]) for k in used]))
+        self.broad_search = Search(surfaces, sharp, allowed, solids,
+                                   (self.penalty, WIDTH, self.friction), places)
+        self._surfaces, self.origin = surfaces, origin
+        self.weights = self.broad_search.weights
+        self.near = NEAR * self.broad_search.height
+        self._begin(layout)
+        return [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in self.dofs]
 
     def _begin(self, layout):
         """Set the gaps at which the pressure begins; InputError if members overlap."""
@@ -361,18 +365,3 @@ def _numbers(layout, which):
         return [layout.number(k) for k in (which if isinstance(which, (list, tuple)) else [which])]
     except NameUnknown as error:
         raise NameUnknown(error.kind, error.name, ("all", *error.known)) from None
-
-
-def _widened(facets, beams):
-    """Facets whose areas on bodies and domains are those of the mean width of beams."""
-    f = facets
-    of_beams = np.isin(f.members, beams)
-    faces = of_beams & (f.spans > 0.0)
-    if not faces.any():
-        return f
-    width = np.sum(f.areas[faces[f.of]]) / np.sum(f.lengths[faces])
-    return f._replace(areas=f.areas * np.where(of_beams[f.of], 1.0, width))
-
-
-def _inside(member, origin):
-    return lambda x: member.contains(_plane(x + origin))

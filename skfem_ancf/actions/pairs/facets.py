@@ -228,8 +228,10 @@ def _of_body(body):
     turn, F = np.exp(1j * body.angle), len(z)
     thick = float(np.min(np.ptp(body.outline, axis=1)))
     n = int(np.clip(np.ceil(np.max(np.abs(np.diff(ends))) / thick), 1, PARTS))
+    (x, w), left = _rule(EDGE), 2.0 * np.arange(n)[:, None] / n - 1.0  # on n equal intervals
+    rule = (left + (1.0 + x) / n).ravel(), np.tile(w / n, n)
     yield _facets(np.tile([0, 1], (F, 1)), weights, _complex(body.position) + turn * ends,
-                  np.array([-1.0, 1.0]), _repeated(n), 1.0, sides=-1.0, heights=thick,
+                  np.array([-1.0, 1.0]), rule, 1.0, sides=-1.0, heights=thick,
                   stiffness=np.inf)
 
 
@@ -255,13 +257,6 @@ def _rule(n):
     """Gauss-Lobatto points and weights on [-1, 1]."""
     x, w = lobatto(n)
     return 2.0 * x - 1.0, 2.0 * w
-
-
-def _repeated(n):
-    """The same on n equal intervals."""
-    x, w = _rule(EDGE)
-    left = 2.0 * np.arange(n)[:, None] / n - 1.0
-    return (left + (1.0 + x) / n).ravel(), np.tile(w / n, n)
 
 
 def _complex(x):

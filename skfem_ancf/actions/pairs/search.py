@@ -2,21 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from math import perm
+from math import comb
 from typing import Any
 
 import numpy as np
 import scipy
 
-from ...core import Array, Packed, cached_property, handle_of
+from ...core import Array, Packed, cached_property, gauss_lobatto, handle_of
 from ..contact.pairs import (APART, EDGE, ON, OPPOSED, SAME, SKIN, Candidates, Groups, PairTables,
-                             Seeds, facing, may_touch, together)
+                             Seeds, along as polynomials, facing, may_touch, together)
 from ..contact.points import cross, dot
-from ..contact.stretches import Cut
+from ..contact.stretches import ALONG, Cut, Rows
 from ..contact.tables import weights_of_motion
 from .facets import Facets
-from .stretches import packed, stretches_of
-from .sweep import Discs
 
 #: Distance of seeds along facets, largest number on a facet; distances in heights for which a list
 #: of candidates is enough that are tried where nothing is near.
@@ -34,14 +32,6 @@ BETWEEN = 1.1
 COARSE = 2
 
 
-def powers(zeta: Array, n: int, order: int) -> Array:
-    """A derivative of the powers 0 to n - 1 of zeta, (len(zeta), n)."""
-    out = np.zeros((len(zeta), n))
-    for k in range(order, n):
-        out[:, k] = zeta ** (k - order) * perm(k, order)
-    return out
-
-
 def displaced(curve: tuple[Array, Array], dofs: Array, z: Array) -> Array:
     """What :meth:`Surfaces.curve` returns for facets with DOFs (n, B), at displacements z, (n,)."""
     weights, start = curve
@@ -53,19 +43,20 @@ class Surfaces:
 
     def __init__(self, facets: Facets) -> None:
         self.facets = f = facets
+        self._weights = f.weights.transpose(2, 0, 1)
         self.points = [self.curve(f.of, f.zeta, order) for order in (0, 1)]
         self.shift = (f.sides * f.offsets)[f.of]
         self.dofs = f.dofs[f.of]
 
     def curve(self, e: Array, zeta: Array, order: int) -> tuple[Array, Array]:
         """Weights (n, B) and constant part (n,) of a derivative of facets by zeta."""
-        V = powers(zeta, self.facets.starts.shape[1], order)
-        return (np.einsum("nbk,nk->nb", self.facets.weights[e], V),
-                np.einsum("nk,nk->n", self.facets.starts[e], V))
+        return (polynomials(self._weights, e, zeta[:, None])[order],
+                polynomials(self.facets.starts.T, e, zeta)[order])
 
     def weights(self, e: Array, zeta: Array) -> tuple[Array, Array]:
         """Weights of places and slopes of facets, (B, n) each."""
-        return self.curve(e, zeta, 0)[0].T, self.curve(e, zeta, 1)[0].T
+        place, slope, _ = polynomials(self._weights, e, zeta[:, None])
+        return place.T, slope.T
 
     def along(self, e: Array, zeta: Array, order: int, z: Array) -> Array:
         """A derivative of facets by zeta at displacements z, (n,)."""
@@ -76,6 +67,149 @@ class Surfaces:
         r, t = (displaced(curve, self.dofs, z) for curve in self.points)
         n = 1j * t / np.abs(t)
         return r + self.shift * n, self.facets.sides[self.facets.of] * n
+
+
+def packed(x: Array, kind: Any) -> Array:
+    """A contiguous array of a kind."""
+    return np.ascontiguousarray(x, dtype=kind)
+
+
+#: Sections extend along d by no more than the height, or ends of cables by this part of it, times
+#: the stretch, of which slopes of the element, and mean ones of its neighbours, have EVEN or more.
+#: In elements shorter than LONG heights by no more than without stretch.
+THIN, EVEN, LONG, TINY = 0.55, 0.82, 1.85, 1e-12
+
+
+def stretches_of(f: Facets, touch: Array, facets: Facets, moves: Array, places: Array
+                 ) -> tuple[Array, Rows]:
+    """Beams that may touch themselves, cut into stretches that cannot: of ``facets`` their element
+    of such beams, or -1, (F,), and the :class:`~skfem_ancf.actions.contact.stretches.Rows`.
+
+    Parameters
+    ----------
+    f
+        The facets of the beams, before corners are rounded.
+    touch
+        True for members that may touch themselves, (M,).
+    moves, places
+        Weights (2, n) of degrees of freedom in the motion of points, and True for those that are
+        places, (n,).
+    """
+    if not touch.any():
+        i, c, x = np.zeros((2, 0), np.int64), np.zeros((2, 0), complex), np.zeros(0)
+        return np.full(len(facets.sides), -1), Rows(i, c, c[0], x, x, i[0], i[0], 1)
+    n, own = f.starts.shape[1], touch[f.members]
+    bottom, top = (np.flatnonzero(own & (f.spans > 0.0) & (f.sides == side))
+                   for side in (-1, 1))
+    chains, far = f.chains[bottom], 1.0 + np.max(f.places + f.spans)
+    along = chains * far + f.places[bottom]
+    of, at = (np.where(touch[g.members], np.searchsorted(
+        along, g.chains * far + g.places + 0.5 * g.spans, "right") - 1, -1)
+        for g in (facets, f))
+    # control points of polynomials and of their slopes, (n, F, B + 1)
+    C = np.concatenate([f.weights, f.starts[:, None]], axis=1)
+    points = _controls(n, C)
+    slopes = _controls(n - 1, C[..., 1:] * np.arange(1.0, n))
+    deep = f.offsets[bottom] == 0.0
+    ends = np.flatnonzero(own & (f.spans == 0.0))
+    last, right = at[ends], f.places[ends] > f.places[bottom[at[ends]]]
+    # sections, and ends from both corners, which must not go back along d
+    most = np.where(deep, 1.0, THIN) * f.heights[bottom]
+    across, parts = points[:, top[deep]] - points[:, bottom[deep]], list[Any]()
+    backward = [(bottom[deep], across), (bottom[deep], -across)]
+    for side in (bottom, top):
+        corner = np.where(right[:, None], points[-1, side[last]], points[0, side[last]])
+        backward.append((bottom[last], np.where(right[:, None], 1.0, -1.0) * (
+            points[:, ends] - corner)))
+    for e in (bottom, top[deep]):
+        parts.append((slopes[:, e], e, 0.5 * ALONG * f.spans[e]))
+    # they may be as large as the beam is stretched there, if it is nearly as much nearby
+    e = bottom[np.union1d(np.flatnonzero(deep), last)]
+    mean = np.mean(slopes, axis=0)
+    near = slopes[:, e] - EVEN * mean[e], mean[e] - EVEN * slopes[[0, -1]][:, e]
+    parts.append((np.concatenate(near), e, TINY * f.spans[e]))
+    for e, x in backward:
+        size, grows = most[at[e]], f.spans[e] > LONG * f.heights[e]
+        parts.append((x + (grows * 2.0 * size / f.spans[e])[:, None] * mean[e], e, np.where(
+            grows, TINY, -1.0) * size))
+    # those of an element one after another
+    x, e, least = (np.concatenate(y) for y in zip(*(
+        (x.transpose(1, 0, 2).reshape(-1, C.shape[1]), np.repeat(e, len(x)),
+         np.repeat(least, len(x))) for x, e, least in parts)))
+    weights, dofs = np.abs(x[:, :-1]), f.dofs[e]
+    sums = [np.sum(weights * own / np.maximum(most[dofs], TINY), axis=1)
+            for most, own in zip(moves, (places[dofs], ~places[dofs]))]
+    return of, Rows(packed(dofs.T, np.int64), packed(x[:, :-1].T, complex),
+                    packed(x[:, -1], complex), packed(least, float),
+                    packed(np.maximum(*sums), float), packed(at[e], np.int64),
+                    packed(chains, np.int64), n - 1)
+
+
+def _controls(n, C):
+    """Control points of polynomials with n coefficients (..., n) on [-1, 1], (n, ...)."""
+    x = gauss_lobatto(n)
+    rise = 0.5 + 0.5 * x
+    basis = np.array([comb(n - 1, k) * rise**k * (1.0 - rise) ** (n - 1 - k) for k in range(n)]).T
+    return np.moveaxis(C @ np.linalg.solve(basis, np.vander(x, n, increasing=True)).T, -1, 0)
+
+
+#: Largest number of parts of a chain, and of all but for one of each; largest turn of a part of a
+#: beam that cannot touch itself, in radians, and its least stretch.
+PARTS, ALL, ARC, LEAST = 32, 500, 1.4, 0.85
+
+
+class Discs:
+    """Discs around parts of chains, of several facets each; ``allowed`` (M, M) says which members
+    may touch."""
+
+    def __init__(self, t: PairTables, allowed: Array) -> None:
+        order = np.lexsort((t.places, t.chains))
+        chains, members, spans = t.chains[order], t.members[order], t.spans[order]
+        sizes = np.unique(chains, return_counts=True)[1]
+        most = max(1, min(PARTS, ALL // len(sizes)))
+        share = np.concatenate([np.arange(n) * min(n, most) // n for n in sizes])
+        first = np.flatnonzero(np.diff(chains * PARTS + share, prepend=-1))
+        self._first, self._last = first, np.append(first[1:], len(order))
+        self._sizes = self._last - first
+        self._of, self._tables = np.repeat(np.arange(len(first)), self._sizes), (
+            t.dofs[:, order], np.ascontiguousarray(t.weights[:, :, order]), t.starts[:, order],
+            t.offsets[order], 0.5 * LEAST * spans)
+        i, j = np.triu_indices(len(first))
+        some = allowed[members[first[i]], members[first[j]]]
+        self._pairs = i, j = i[some], j[some]
+        self._own = np.flatnonzero(chains[first[i]] == chains[first[j]])
+        self._faces = np.flatnonzero((t.sides[order] < 0.0) & (spans > 0.0))
+        self._follows = np.diff(chains[self._faces], prepend=-1) == 0
+
+    def stay_apart(self, z: Array) -> Array:
+        """True for straight ways between displacements (n + 1, N) on which no discs meet, but those
+        of a beam that is bent too little between them, (n,)."""
+        dofs, weights, c, offsets, least = self._tables
+        for w, at in zip(weights, dofs):
+            c = c + w * z[:, None, at]
+        middle = np.add.reduceat(c[:, 0], self._first, axis=1) / self._sizes
+        size = np.abs(c)
+        radius = np.maximum.reduceat(np.max(np.abs(c[:, 0] - middle[:, self._of]) + size[
+            :, 1:].sum(axis=1), axis=0) + offsets, self._first)
+        (i, j), far = self._pairs, np.ones(len(self._pairs[0]), bool)
+        # Parts of a chain between which it turns by less than ARC cannot touch each other, see
+        # :mod:`skfem_ancf.actions.contact.stretches`.
+        slope, turned = c[:, 1, self._faces], np.zeros((len(c), c.shape[2] + 1))
+        more = np.tensordot(size[:, 2:, self._faces], np.arange(2, c.shape[1]), (1, 0))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            within = 2.0 * np.arcsin(more / size[:, 1, self._faces])
+        turned[:, 1 + self._faces[1:]] = self._follows[1:] * np.abs(np.angle(
+            slope[:, 1:] * slope[:, :-1].conj()))
+        turned = np.cumsum(turned, axis=1)
+        turn = turned[:, self._last[j[self._own]]] - turned[:, self._first[i[self._own]] + 1]
+        most = ARC - np.max(within, axis=1, initial=0.0)
+        most[np.any(size[:, 1] < least, axis=1)] = 0.0
+        far[self._own] = ~np.all(turn < most[:, None], axis=0)
+        i, j = i[far], j[far]
+        a = middle[:, i] - middle[:, j]
+        way, a = a[1:] - a[:-1], a[:-1]
+        along = np.clip(-(a * way.conj()).real / np.maximum(np.abs(way) ** 2, 1e-300), 0.0, 1.0)
+        return np.all(np.abs(a + along * way) > radius[i] + radius[j], axis=1)
 
 
 class Search:
@@ -188,11 +322,6 @@ class Search:
 
     # parts that are one body
 
-    def _along(self, e, zeta):
-        """Where points of facets are along the axis."""
-        f = self.surfaces.facets
-        return f.places[e] + 0.5 * (1.0 + zeta) * f.spans[e]
-
     def _axes(self, z, parts):
         """Ends (n, 2) of short segments of the axes of beams, their chains, places and members."""
         f = self.surfaces.facets
@@ -201,7 +330,7 @@ class Search:
         e, at = np.repeat(bottom, n), np.linspace(*f.ends[bottom].T, n).T.ravel()
         x = 0.5 * (self.surfaces.along(e, at, 0, z) + self.surfaces.along(
             np.repeat(top, n), at, 0, z)).reshape(-1, n)
-        s = self._along(e, at).reshape(-1, n)
+        s = (f.places[e] + 0.5 * (1.0 + at) * f.spans[e]).reshape(-1, n)
         e = np.repeat(bottom, parts)
         return (np.column_stack([x[:, :-1].ravel(), x[:, 1:].ravel()]), f.chains[e],
                 0.5 * (s[:, :-1] + s[:, 1:]).ravel(), f.members[e])
@@ -215,13 +344,22 @@ class Search:
             inside = contains(ends.mean(axis=1)) | contains(ends[:, 0]) | contains(ends[:, 1])
             other = f.chains[np.argmax(f.members == k)]
             out += [(i, a, other, 0.0) for i, a in zip(chains[inside], s[inside])]
-        if not len(ends):
-            return _thinned(out, self.height)
-        i, j = self._close(axes, near)
-        met = _distance(ends[i], ends[j]) < near
-        for a, b in zip(i[met], j[met]):
-            out += [(chains[a], s[a], chains[b], s[b]), (chains[b], s[b], chains[a], s[a])]
-        return _thinned(out, self.height)
+        if len(ends):
+            i, j = self._close(axes, near)
+            # the least distance of segments: 0 where they cross, or that of an end from the other
+            apart = np.where(crossing(ends[i], ends[j]), 0.0, np.inf)
+            for p, q in ((ends[i], ends[j]), (ends[j], ends[i])):
+                path = q[:, 1] - q[:, 0]
+                for k in (0, 1):
+                    d = p[:, k] - q[:, 0]
+                    share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
+                    apart = np.minimum(apart, np.abs(d - share * path))
+            for a, b in zip(i[apart < near], j[apart < near]):
+                out += [(chains[a], s[a], chains[b], s[b]), (chains[b], s[b], chains[a], s[a])]
+        # without those of nearly equal places
+        h = self.height
+        return list({(i, round(2.0 * s / h), j, round(2.0 * r / h)): (i, s, j, r)
+                     for i, s, j, r in out}.values())
 
     def _close(self, axes, near):
         """Pairs of segments of axes that may be as near, and are not parts of one body."""
@@ -321,21 +459,3 @@ def crossing(a: Array, b: Array) -> Array:
     size = np.where(np.abs(size) > PARALLEL * np.abs(u) * np.abs(v), size, np.nan)
     s, r = cross(w, v) / size, cross(w, u) / size
     return (s > 0.0) & (s < 1.0) & (r > 0.0) & (r < 1.0)
-
-
-def _distance(a, b):
-    """The least distance of segments (n, 2)."""
-    out = np.where(crossing(a, b), 0.0, np.inf)
-    for p, q in ((a, b), (b, a)):
-        path = q[:, 1] - q[:, 0]
-        for k in (0, 1):
-            d = p[:, k] - q[:, 0]
-            share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
-            out = np.minimum(out, np.abs(d - share * path))
-    return out
-
-
-def _thinned(spots, height):
-    """Spots without those of nearly equal places."""
-    return list({(i, round(2.0 * s / height), j, round(2.0 * r / height)): (i, s, j, r)
-                 for i, s, j, r in spots}.values())
