@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_bvp
+from scipy.integrate import solve_bvp, trapezoid
 from scipy.linalg import null_space
 from scipy.sparse import csr_array
 
@@ -802,3 +802,22 @@ def test_a_small_radius_slides_without_a_ripple():
     run = scene.run([1.0, 2.0], increments=15)
     force = np.array([run.state(k).contact().total for k in range(15, 31)])
     assert np.all(force[:, 1] < -1.0) and np.all(np.abs(force[:, 0]) < -5e-3 * force[:, 1])
+
+
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum"])
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+def test_a_damped_impact_has_its_pressure_and_slips(scheme, damping):
+    """A bar that lands flat and slides: the pressure is that of the force, with damping."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 9), height=0.05, origin=(0.0, 0.1)),
+                ElementBeamANCF(2), StVenantKirchhoff(1e7, 0.3, 1000.0), width=0.02)
+    scene = Scene(beam).gravity((0.0, -9.81)).initial_velocity((2.0, -3.0))
+    scene.obstacle(Line((0.0, 0.0)), friction=0.2, damping=damping)
+    history = scene.integrate(0.026, 5e-4, scheme=scheme)
+    found = [history.state(k).contact() for k in range(len(history))]
+    pressed = [contact for contact in found if len(contact)]
+    assert len(pressed) > 2
+    for contact in pressed[:3]:
+        order = np.argsort(contact.points[0])
+        total = 0.02 * trapezoid(contact.pressure[order], contact.points[0][order])
+        assert total == pytest.approx(contact.total[1], rel=0.02)
+        assert not contact.sticking.any()

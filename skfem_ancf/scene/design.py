@@ -462,7 +462,7 @@ def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
         largest = np.abs(system.internal_force(u, None, state.load)
                          * c.coordinate_sizes).max() / system.size
         contacts = system.forces.contacts
-        for (_, group), (_, x, push, _, gap) in zip(
+        for (_, group), (_, x, push, _, gap, *_) in zip(
                 contacts.groups, contacts.pushes(u, None, state.load)):
             i = group.first + 2 * np.arange(len(group.weights))[:, None]
             # a point that supports hold can neither lift nor press

@@ -376,7 +376,7 @@ class Contacts:
                span: float = 0.0) -> list[tuple[Any, ...]]:
         """Contact forces, in statics without velocities; means of a step from ``start`` (N,)."""
         # For each group its obstacle's number, points (2, n), forces (2, n), pressures and gaps
-        # (n,).
+        # (n,), which points touch, and which of them friction holds.
         if self.moving or self.custom:
             self.put(t - 0.5 * span, span, self.tables.poses)
         same, out = start is None, []
@@ -387,27 +387,28 @@ class Contacts:
                 (4, at.size)), np.zeros((16, at.size))
             touch, _ = touch_of(pair, same, found if same else project(pair, BEGIN, start, at),
                                 found, at)
-            r = response(pair, same, touch)
+            r, normal = response(pair, same, touch), 0.0
             if rate is not None and group.law.damping > 0.0:
                 there, rates = project(pair, NOW, middle, at), np.empty((4, at.size))
                 set_rates(pair, rate, at, rates)
                 pressed, spot = touch_of(pair, True, there, there, at)
                 damp(pair, 0.0, pressed, spot, rates, R, K)
+                normal = np.sum(R[:2] * pressed.gap[:2], axis=0)
             add_resistance(touch, r, R)
+            held = np.abs(r.friction) < (1.0 - SEEN) * group.law.friction * r.pressure
             out.append((which, np.array([found.surface.real, found.surface.imag])
-                        + self.origin[:, None], -R[:2], r.pressure / group.areas, found.gap))
+                        + self.origin[:, None], -R[:2], (r.pressure - normal) / group.areas,
+                        found.gap, r.pressure > 0.0, held))
         return out
 
     def slipping(self, u: Array, t: float) -> list[Any]:
         """The obstacles at which points are at the limit of friction, in statics."""
         out = []
-        for (_, group), (k, _, force, pressure, _) in zip(self.groups, self.pushes(u, None, t)):
+        for (_, group), (k, _, _, pressure, _, _, held) in zip(
+                self.groups, self.pushes(u, None, t)):
             one, normal = self.obstacles[k], pressure * group.areas
-            limit = one.friction * normal
-            along = np.sqrt(np.maximum(np.sum(force**2, axis=0) - normal**2, 0.0))
             pressed = normal > SEEN * normal.max(initial=0.0)
-            if one.friction > 0.0 and one not in out and np.any(
-                    along[pressed] > (1.0 - SEEN) * limit[pressed]):
+            if one.friction > 0.0 and one not in out and not np.all(held[pressed]):
                 out.append(one)
         return out
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, InputError, NameUnknown, refuse, require_index
-from ..contact.contacts import SEEN
 from ..item import Item
 
 
@@ -133,17 +132,13 @@ def _touching(state, forces, start, span, known, member):
     """Contact points, forces, pressures, gaps, sticking and the least gap of each group of points
     of an obstacle, then of bodies that touch each other, on both sides."""
     contacts, pushes = _pushes(state, start, span)
-    for (_, group), (k, x, force, pressure, gap) in pushes:
+    for (_, group), (k, x, force, pressure, gap, touch, sticks) in pushes:
         one, first = contacts.obstacles[k], int(group.first[0])
         if not any(one is other for other in known) or (
                 member is not None and not state.system.slices[member].start <= first < (
                     state.system.slices[member].stop)):
             continue
-        normal = pressure * group.areas
-        along = np.sqrt(np.maximum(np.sum(force**2, axis=0) - normal**2, 0.0))
-        sticks = along < (1.0 - SEEN) * one.friction * normal
-        pressure = _balanced(group, pressure)
-        touch = pressure > 0.0
+        pressure = _balanced(group, pressure, touch)
         yield (x[:, touch], force[:, touch], pressure[touch], gap[touch], sticks[touch],
                float(gap.min()))
     for element, at in forces.changing:
@@ -161,7 +156,7 @@ def _touching(state, forces, start, span, known, member):
 def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, float, Array]]:
     """Forces of contact on a beam, whose DOFs are given: element, xi, and nodal force (nb, 2)."""
     u, out, (forces, start, span) = np.array(state.u), [], _step_of(state)
-    for (_, group), (_, _, force, _, _) in _pushes(state, start, span)[1]:
+    for (_, group), (_, _, force, *_) in _pushes(state, start, span)[1]:
         if not dofs.start <= group.first[0] < dofs.stop:
             continue
         m, ne, xi = group.points, group.elements - 2, _along_elements(group)
@@ -189,8 +184,8 @@ def _along_elements(group):
     return (length / np.maximum(length[:, -1:], 1e-300)).ravel()
 
 
-def _balanced(group, pressure):
-    """The nodal pressure (n,) in equilibrium with the forces of points; zero at free points."""
+def _balanced(group, pressure, touching):
+    """The nodal pressure (n,) in equilibrium with the forces of points; zero where none touches."""
     # The nodal force over the area of its shape function (lumped) on the contact surface; free
     # points between two in contact count if these are less than an element apart. The positions of
     # both nodes have the functions number 0 and half; each side of the beam is separate.
@@ -202,7 +197,6 @@ def _balanced(group, pressure):
     ends = np.array([group.first, group.first + 2 * half])
     ends[1, -2 * m:] = ends[0, -2 * m:]
     nodes = np.unique(ends * 4 + side, return_inverse=True)[1].reshape(2, -1)
-    touching = pressure > 0.0
     # A corner is a point of bottom or top and points of an end. A face that touches only there
     # faces away from the obstacle: its force is on the other one. So points at corners belong with
     # a point each of the face there that touches more, (2, k).
