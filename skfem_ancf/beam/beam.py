@@ -116,7 +116,14 @@ class Beam(Immutable):
                  tolerance: float = 1e-3, damping: KelvinVoigt | None = None,
                  section: Section | None = None) -> None:
         require_kind("mesh", mesh, MeshBeam)
-        self.section = _section(section, width)
+        refuse(section is None and width is None, 'a beam has a section: give width=, that of a '
+               'rectangle, or section=, as Section.profile("IPE 200")')
+        refuse(section is not None and width is not None, "give a width or a section, not both: "
+               "got {!r} and {!r}", width, section)
+        if section is None:
+            section = Rectangle(width)  # type: ignore[arg-type]
+        self.section = require_kind("section", section, Section,
+                                    ', as Section.profile("IPE 200")')
         if self.section.has_materials:
             refuse(material is not None, "material must be None, since {!r} has its own, got {!r}",
                    self.section, material)
@@ -370,14 +377,3 @@ class Beam(Immutable):
                               shape=(self.N, self.N)).tocsr()
         M.eliminate_zeros()
         return M
-
-
-def _section(section, width):
-    """The section, or a rectangle of the given width."""
-    refuse(section is None and width is None, 'a beam has a section: give width=, that of a '
-           'rectangle, or section=, as Section.profile("IPE 200")')
-    if section is None:
-        return Rectangle(width)
-    refuse(width is not None, "give a width or a section, not both: got {!r} and {!r}", width,
-           section)
-    return require_kind("section", section, Section, ', as Section.profile("IPE 200")')

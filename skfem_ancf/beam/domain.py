@@ -205,7 +205,15 @@ class Domain(Immutable):
 
     def __init__(self, basis: Basis, residual: LinearForm, tangent: BilinearForm,
                  mass: BilinearForm | None = None, name: str | None = None) -> None:
-        _require_plane(basis)
+        refuse(not isinstance(basis, Basis), "a Domain needs a Basis of scikit-fem, got {!r}",
+               basis)
+        refuse(basis.mesh.dim() != 2, "a Domain is plane, as beams are, got a mesh of dimension "
+               "{}: {!r}", basis.mesh.dim(), basis.mesh)
+        refuse(not isinstance(basis.elem, ElementVector) or basis.elem.dim != 2, "the unknown of a "
+               "Domain is a displacement with two components: use an "
+               "ElementVector(ElementQuad2()), got {!r}", basis.elem)
+        refuse(len(np.unique(basis.element_dofs)) < basis.N, "the basis of a Domain must cover its "
+               "whole mesh: for a part of it use mesh.restrict(elements)")
         for what, form, kind in (("residual", residual, LinearForm),
                                  ("tangent", tangent, BilinearForm), ("mass", mass, BilinearForm)):
             if not (isinstance(form, kind) or (form is None and what == "mass")):
@@ -216,6 +224,12 @@ class Domain(Immutable):
         self.basis, self.residual, self.tangent, self.mass = basis, residual, tangent, mass
         self.name = require_label("name", name)
         self.N: int = basis.N
+        #: Names of both components.
+        self.dofnames = ["u^1", "u^2"]
+        #: Mean of the vertices, shape (2,).
+        self.origin = np.asarray(basis.mesh.p.mean(axis=1))
+        #: The larger of width and height.
+        self.size = float(np.max(np.ptp(basis.mesh.p, axis=1)))
         # a numbering of the DOFs with a small bandwidth: reverse Cuthill-McKee, or along
         # x or y
         pairs, n = basis.element_dofs[::2] // 2, basis.N // 2
@@ -379,11 +393,6 @@ class Domain(Immutable):
     # the interface of a beam
 
     @property
-    def dofnames(self) -> list[str]:
-        """Names of both components."""
-        return ["u^1", "u^2"]
-
-    @property
     def bandwidth(self) -> int:
         """Number of subdiagonals."""
         return int(np.max(np.ptp(self.numbers(self.basis.element_dofs), axis=0)))
@@ -397,16 +406,6 @@ class Domain(Immutable):
     def q0(self) -> Array:
         """DOFs of the position, (N,)."""
         return self.q0_local + self.rigid_motions()[:, :2] @ self.origin
-
-    @property
-    def origin(self) -> Array:
-        """Mean of the vertices, shape (2,)."""
-        return np.asarray(self.basis.mesh.p.mean(axis=1))
-
-    @property
-    def size(self) -> float:
-        """The larger of width and height."""
-        return float(np.max(np.ptp(self.basis.mesh.p, axis=1)))
 
     @property
     def sizes(self) -> Array:
@@ -547,7 +546,14 @@ class Domain(Immutable):
                                          & (point[:, None] <= high + pad), axis=0))
             if not len(near):
                 continue
-            X = _local(mapping, point, near)
+            # not mapping.invF, which fails for all cells if one does not converge
+            X = np.full((2, len(near), 1), 1.0 / 3.0)
+            with np.errstate(all="ignore"):
+                for _ in range(ITERATIONS):
+                    rest = point[:, None] - mapping.F(X, tind=near)[..., 0]
+                    D = np.moveaxis(mapping.DF(X, tind=near)[..., 0], -1, 0)
+                    X = X + np.linalg.solve(D, rest.T[..., None]).transpose(1, 0, 2)
+            X = X[..., 0]
             out = np.maximum(-X.min(axis=0), (X.sum(axis=0) if mesh.t.shape[0] == 3 else
                                               X.max(axis=0)) - 1.0)
             best = int(np.argmin(np.where(np.isfinite(out), out, np.inf)))
@@ -569,20 +575,16 @@ class Domain(Immutable):
         cells, X = self._locate(x)
         refuse_any(cells < 0, "the point {:.6g} is outside of {!r}", x, self, error=MeshError)
         dofs = self.numbers(self.basis.element_dofs[:, cells]).reshape(-1, 2, len(cells))
-        return dofs.swapaxes(0, 1), self._functions(X[:, :, None], cells)[..., 0]
+        return dofs.swapaxes(0, 1), self._functions(X[:, :, None], cells)[0][..., 0]
 
     def _functions(self, X, cells=None):
-        """Scalar shape functions (k, n, points) at points of the reference cell."""
-        return np.array([np.asarray(field)[0] for field in self._fields(X, cells)])
-
-    def _gradients(self, X, cells=None):
-        """Their gradients (k, 2, n, points)."""
-        return np.array([np.asarray(field.grad)[0] for field in self._fields(X, cells)])
-
-    def _fields(self, X, cells):
+        """Scalar shape functions (k, n, points) and gradients (k, 2, n, points) at points of the
+        reference cell."""
         basis = self.basis
-        return [basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0]
-                for k in range(0, basis.Nbfun, 2)]
+        fields = [basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0]
+                  for k in range(0, basis.Nbfun, 2)]
+        return (np.array([np.asarray(field)[0] for field in fields]),
+                np.array([np.asarray(field.grad)[0] for field in fields]))
 
 
 class DomainPoints:
@@ -605,7 +607,7 @@ class DomainPoints:
     def fields(self, u: Array) -> tuple[Array, Array]:
         """Displacement (2, n) and its gradient (2, 2, n) for DOFs ``u`` (N,) of the scene."""
         cells, X = self.body._locate(self.start)
-        slopes = self.body._gradients(X[:, :, None], cells)[..., 0]
+        slopes = self.body._functions(X[:, :, None], cells)[1][..., 0]
         return self.displacement(u), np.einsum("kjn,ikn->ijn", slopes, u[self.slice][self._dofs])
 
 
@@ -620,31 +622,9 @@ def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array
     cell = mesh.init_refdom().refined(parts)
     x = np.asarray(basis.mapping.F(cell.p))
     dofs = domain.numbers(basis.element_dofs).reshape(-1, 2, mesh.nelements)
-    grads = domain._gradients(cell.p)
-    moved = np.einsum("kep,kce->cep", domain._functions(cell.p), u[dofs])
+    functions, grads = domain._functions(cell.p)
+    moved = np.einsum("kep,kce->cep", functions, u[dofs])
     gradient = np.einsum("kjep,kce->cjep", grads, u[dofs])
     first = cell.p.shape[1] * np.arange(mesh.nelements)
     cells = (first[:, None, None] + cell.t.T).reshape(-1, len(cell.t))
     return x.reshape(2, -1), moved.reshape(2, -1), gradient.reshape(2, 2, -1), cells
-
-
-def _require_plane(basis):
-    refuse(not isinstance(basis, Basis), "a Domain needs a Basis of scikit-fem, got {!r}", basis)
-    refuse(basis.mesh.dim() != 2, "a Domain is plane, as beams are, got a mesh of dimension {}: "
-           "{!r}", basis.mesh.dim(), basis.mesh)
-    if not isinstance(basis.elem, ElementVector) or basis.elem.dim != 2:
-        raise InputError("the unknown of a Domain is a displacement with two components: use an "
-                         f"ElementVector(ElementQuad2()), got {shown(basis.elem)}")
-    refuse(len(np.unique(basis.element_dofs)) < basis.N, "the basis of a Domain must cover its "
-           "whole mesh: for a part of it use mesh.restrict(elements)")
-
-
-def _local(mapping, point, cells):
-    """Local coordinates (2, n) of a point in cells (n,), by Newton's method."""
-    X = np.full((2, len(cells), 1), 1.0 / 3.0)
-    with np.errstate(all="ignore"):
-        for _ in range(ITERATIONS):
-            rest = point[:, None] - mapping.F(X, tind=cells)[..., 0]
-            D = np.moveaxis(mapping.DF(X, tind=cells)[..., 0], -1, 0)
-            X = X + np.linalg.solve(D, rest.T[..., None]).transpose(1, 0, 2)
-    return X[..., 0]

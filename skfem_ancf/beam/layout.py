@@ -330,7 +330,12 @@ class PointLocator:
 
     def _ask(self, x, beams):
         """Raise InputError: several axes are nearest to a point, shape (2, 1)."""
-        around = [(off, b, chain) for b in beams for off, chain in b.finder.chains_at(x)]
+        around = []
+        for b in beams:
+            for chain in range(int(b.mesh.chains[-1]) + 1):
+                e, X, outside, _ = b.finder.find(x, chain)
+                if outside[0] == 0.0:
+                    around.append((float(b.finder.from_axis(e, X)[0]), b, chain))
         least = min(off for off, *_ in around)
         found = [(b, chain) for off, b, chain in around if off <= least + b.finder.equal]
         where = f"the point {shown(tuple(map(float, x[:, 0])))} is equally close to the axes of "

@@ -55,7 +55,7 @@ class NotCompiled(Exception):
 _MARKS = re.compile(rb"^\s*(@source|@primitive|@apart|import numba|from (numba|\.+source) |"
                     rb"from \.+core import (\([^)]*|[^(\n]*)"
                     rb"\b(source|primitive|apart|indices|[FI][123])\b)", re.MULTILINE)
-_ALSO = "loops.py", "packed.py"
+_ALSO = "loops.py"
 
 
 @cache
@@ -64,7 +64,7 @@ def compiled_files() -> dict[Path, bytes]:
     package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
     texts = {path: path.read_bytes() for path in sorted(package.rglob("*.py"))}
     return {path: text for path, text in texts.items()
-            if path.name in _ALSO or _MARKS.search(text)}
+            if path.name == _ALSO or _MARKS.search(text)}
 
 
 @cache

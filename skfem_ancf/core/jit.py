@@ -20,8 +20,7 @@ from numba.extending import (intrinsic, lower_builtin, lower_getattr_generic, mo
 
 from .callbacks import FROM_PYTHON, deferred, kept as keeping, raise_kept
 from .code_cache import cannot_keep, can_keep, key, nothing_collected, verified
-from .source import APART, MADE, MARKED, PYTHON, apart, room, shaped
-from .packed import Packed, hints
+from .source import APART, MADE, MARKED, PYTHON, Packed, apart, hints, room, shaped
 
 
 # without "nnan" and "ninf", since strains that are not finite must be detected
@@ -169,7 +168,7 @@ def _from_python(function):
 
 
 class Record(types.NamedTuple):
-    """A named tuple by the address of its :class:`~skfem_ancf.core.packed.Packed`. Fields are read
+    """A named tuple by the address of its :class:`~skfem_ancf.core.source.Packed`. Fields are read
     where they are used. Tuples of many arrays by value take Numba ten times as long, since it
     counts all references."""
 
@@ -229,7 +228,7 @@ def _array(context, builder, kind, data, shape):
 
 @cache
 def reader(kind: Any) -> Any:
-    """A compiled function from the address of a :class:`~skfem_ancf.core.packed.Packed` tuple."""
+    """A compiled function from the address of a :class:`~skfem_ancf.core.source.Packed` tuple."""
     made = Record(kind)
 
     @intrinsic

@@ -200,15 +200,6 @@ class Finder:
         """Distance of reference points (2, n) of elements (n,) from the axis, shape (n,)."""
         return np.abs(X[1] - 0.5) * np.ravel(self.mapping.inverse.height(e, X[0][:, None]))
 
-    def chains_at(self, x: Array) -> list[tuple[float, int]]:
-        """Chains that contain a point (2, 1), and the distances of their axes from it."""
-        found = []
-        for chain in range(int(self.mesh.chains[-1]) + 1):
-            e, X, outside, _ = self.find(x, chain)
-            if outside[0] == 0.0:
-                found.append((float(self.from_axis(e, X)[0]), chain))
-        return found
-
     @cached_property
     def _circles(self):
         """Centres (2, nelements) and radii (nelements,) of bounding circles."""

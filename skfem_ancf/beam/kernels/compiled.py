@@ -112,7 +112,7 @@ class CompiledTables(NamedTuple):
 
 def compiled_tables(t: StrainTables) -> CompiledTables:
     """The CompiledTables of a StrainTables."""
-    ne, pattern, section = len(t.start), t.pattern, t.kind == SECTION
+    ne, pattern, section = len(t.start), t.pattern, t.pattern.kind == SECTION
 
     def each(x, column):  # (1 or ne, ...)
         return x[t.at[:, column]] if len(x) > 1 else x
@@ -127,13 +127,19 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
         frame, H = frame / R[:, :, None], H * sigma[:, a] * sigma[:, b]
         scales, reach = (_scales(D), _scales(sigma)), sigma * reach if reach.size else sigma
     K, Z, coupled = _constant(each(t.C, OF_C), D)
-    P, Q = map(np.ascontiguousarray, _products(G[0], pattern.products, own))
+    P = Q = np.zeros((0, 0))
+    if not own:
+        m, (g, h) = G.shape[2], pattern.products
+        both = (G[0].take(g, 0).T[:, None] * G[0].take(h, 0).T).reshape(m * m, -1)
+        (*_, one, other), (*_, two, opposite) = _lower(m, 0), _lower(m, -1)
+        P = both.take(one, 0) + both.take(other, 0)
+        Q = np.ascontiguousarray((both.take(two, 0) - both.take(opposite, 0)).compress(g != h, 1))
     along, mixing = map(_sparse, (
         t.along, t.along[:0] if t.law.kind == LINEAR else to_moduli(
             t.pattern, t.weights.shape[1], t.along.tobytes())))
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
-        compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
+        compiled_pattern(pattern), pattern.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _scales(reach),
         _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled,
         t.law, along, _blocks(each(t.weights, OF_WEIGHTS)), mixing, _NO_MEMORY)
@@ -172,17 +178,6 @@ def _lower(m, k):
 def _scales(x):
     """Blocks of factors (1 or ne, n), empty if all are one."""
     return _NOTHING if (x == 1.0).all() else _blocks(x)
-
-
-def _products(G, products, own):
-    """P and Q of derivatives (rows, m)."""
-    if own:
-        return np.zeros((0, 0)), np.zeros((0, 0))
-    m, (g, h) = G.shape[1], products
-    both = (G.take(g, 0).T[:, None] * G.take(h, 0).T).reshape(m * m, -1)
-    (*_, one, other), (*_, two, opposite) = _lower(m, 0), _lower(m, -1)
-    return (both.take(one, 0) + both.take(other, 0),
-            (both.take(two, 0) - both.take(opposite, 0)).compress(g != h, 1))
 
 
 def _constant(C, D):

@@ -9,8 +9,7 @@ import numpy as np
 from ...core import Array, cached_property, refuse
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
-from .elements import Elements
-from .runs import run_eigen_force, run_eigen_tangent, run_force, run_tangent
+from .elements import Elements, run_eigen_force, run_eigen_tangent, run_force, run_tangent
 from .tables import (CABLE, HISTORY, LINEAR, StrainTables, law_evaluate, material_of, repeated,
                      separated)
 
@@ -87,7 +86,15 @@ class ElementKernel:
         many = self.elements if k == 1 else [
             elements_of(repeated(t, k, self.N)) for t in self.tables]
         for e in many:
-            out += energies_of(e, u.ravel())
+            strain = strains(e, u.ravel())
+            if e.t.law.kind == LINEAR:
+                out += 0.5 * np.sum(strain * e.linear_stress(strain), axis=0)
+            else:
+                out += energy_at(e, e.at_points(strain))
+            if e.C is not None:
+                U = e.relative(u.ravel()).reshape(2 * e.m, -1)
+                out += 0.5 * np.einsum("ie,kij,je->e" if len(e.C) == 1 else "ie,eij,je->e", U,
+                                       e.C, U)
         return out.reshape(k, -1)
 
     @cached_property
@@ -183,7 +190,7 @@ class ElementKernel:
     def geometric(self, u: Array, stress: Array) -> Array:
         """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m)."""
         # The stresses of all :attr:`tables` are side by side; further columns are ignored.
-        given = np.split(stress, np.cumsum([t.rows.shape[1] for t in self.tables]), axis=1)
+        given = np.split(stress, np.cumsum([t.pattern.ns for t in self.tables]), axis=1)
         return self._tangents(_run_geometric, u, self._apart, given)
 
     def _tangents(self, run, u, elements, given=None):
@@ -206,7 +213,13 @@ class ElementKernel:
             found.append(np.array([B, e.square(e.moduli_at(strain)) @ B]))
             stresses.append(e.stress(strain).T)
         if self.constant is not None:
-            R = np.broadcast_to(_square_root(self.constant), (ne, n, n))
+            # R with R^T R = constant, which is semidefinite
+            size = np.sqrt(np.diagonal(self.constant, axis1=1, axis2=2))  # units of DOFs differ
+            size = np.where(size > 0.0, size, 1.0)[:, :, None]
+            values, V = np.linalg.eigh(self.constant / (size * size.transpose(0, 2, 1)))
+            values = np.where(values > 1e-12 * values[:, -1:], values, 0.0)
+            R = (np.sqrt(values[:, None]) * V * size).transpose(0, 2, 1)
+            R = np.broadcast_to(R, (ne, n, n))
             found.append(np.array([R, R]))
             stresses.append((R @ self.gather(u).reshape(ne, n, 1))[..., 0])
         return *np.concatenate(found, axis=2), np.concatenate(stresses, axis=1)
@@ -225,15 +238,6 @@ def _run_geometric(e, u, given, flat, ld):
     e.add_to_band(e.tangent(one, Y, given.reshape(e.ne, e.ns).T, None), flat, ld)
 
 
-def _square_root(K):
-    """R with R^T R = K, for semidefinite matrices (k, n, n)."""
-    size = np.sqrt(np.diagonal(K, axis1=1, axis2=2))  # units of the DOFs differ
-    size = np.where(size > 0.0, size, 1.0)[:, :, None]
-    values, V = np.linalg.eigh(K / (size * size.transpose(0, 2, 1)))
-    values = np.where(values > 1e-12 * values[:, -1:], values, 0.0)
-    return (np.sqrt(values[:, None]) * V * size).transpose(0, 2, 1)
-
-
 def strains(e: Elements, u: Array) -> Array:
     """Strains of the samples, (ns, ne), linearised for a complex u."""
     _, d, one, Y = e.at(u.real)
@@ -241,19 +245,6 @@ def strains(e: Elements, u: Array) -> Array:
     if not np.iscomplexobj(u):
         return strain
     return strain + 1j * e.change(Y, e.rows(e.relative(u.imag)))
-
-
-def energies_of(e: Elements, u: Array) -> Array:
-    """Energies of the elements, (ne,)."""
-    strain = strains(e, u)
-    if e.t.law.kind == LINEAR:
-        out = 0.5 * np.sum(strain * e.linear_stress(strain), axis=0)
-    else:
-        out = energy_at(e, e.at_points(strain))
-    if e.C is not None:
-        U = e.relative(u).reshape(2 * e.m, -1)
-        out += 0.5 * np.einsum("ie,kij,je->e" if len(e.C) == 1 else "ie,eij,je->e", U, e.C, U)
-    return out
 
 
 def energy_at(e: Elements, E: Array) -> Array:
@@ -286,7 +277,7 @@ def history_size(t: StrainTables) -> int:
 
 def _rows(t):
     """Variables of a point, and its components of strain: cables have fibres."""
-    return material_of(t.law).number + (1 if t.kind == CABLE else 3)
+    return material_of(t.law).number + (1 if t.pattern.kind == CABLE else 3)
 
 
 def elements_of(t: StrainTables) -> Elements:
@@ -320,7 +311,7 @@ class ElementsWithHistory(Elements):
 
     def __init__(self, t: StrainTables) -> None:
         super().__init__(t)
-        self.material, self._fibres = material_of(t.law), t.kind == CABLE
+        self.material, self._fibres = material_of(t.law), t.pattern.kind == CABLE
         self._own(np.zeros(history_size(t)), np.zeros(1), np.zeros(history_size(t)))
         self._scale = t.law.scale.reshape(3, 1, 1)
         self._known: Any = (np.zeros(0), None, np.zeros(0), np.zeros(0), np.nan)

@@ -1,4 +1,4 @@
-"""Compiled kernels: the functions of :mod:`.runs` as loops over blocks of elements. t are
+"""Compiled kernels: the kernels of :mod:`.elements` as loops over blocks of elements. t are
 :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and ``out`` are stresses (ne
 ns,), or of size 0. Other arrays are as in :mod:`.blocks`."""
 
@@ -6,12 +6,11 @@ import numpy as np
 
 from ...core.band import add_multiple
 from ...core import F1, F2, I1, apart, room, source
-from .blocks import (add, add_forces_of, add_geometric, add_material, add_matrices, at_points,
-                     block, changes, components, directions, displaced, from_points, gather,
-                     between_samples, moduli, place, products, put, scale_products, strains,
-                     stresses, take, times, to_rows)
+from .blocks import (AT_START, add, add_forces_of, add_geometric, add_material, add_matrices,
+                     at_points, between_samples, block, changes, components, directions, displaced,
+                     evaluate_increment, from_points, gather, law_stresses, moduli, of_block, place,
+                     products, put, scale_products, strains, take, times, to_rows)
 from .compiled import W, CompiledTables
-from .increments import AT_START, evaluate_increment, of_block
 from .tables import HISTORY, LINEAR, conserve, evaluate_history, law_evaluate
 
 
@@ -42,7 +41,10 @@ def run_force(t, u, v, given, out, f):
                 changes(t, D, dd, C)
                 add(0.5, C, E)
                 add(0.5, V, U)
-            stresses(t, first, E, C, T)
+            if t.law.kind == LINEAR:
+                times(t.pattern.pairs, block(t.H, first), E, T)
+            else:
+                law_stresses(t, first, E, C, T)
         if out.size > 0:
             put(t, first, T, out[:0], out)
         if given.size > 0:

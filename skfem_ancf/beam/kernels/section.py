@@ -108,7 +108,7 @@ class SectionKernel(ElementKernel):
         for one, e in zip(self.integrals, self.elements):
             if one.first:
                 r = e.x + e.rows(e.relative(u))
-                yield r[e.t.rows[:, one.samples.component == component]]
+                yield r[e.t.pattern.rows[:, one.samples.component == component]]
 
     def inverted(self, u: Array) -> bool:
         for x, y in self._gradients(u, 2):
@@ -210,23 +210,6 @@ def _mixing(samples, nodes, axis, means, coupled):
 MIDDLE = 1200.0
 
 
-def softened(weight: float) -> tuple[Array, Array]:
-    """Three points on [0, 1], exact for cubics: two Gauss points and a weighted middle one."""
-    # A weight of 4/9 gives the three-point Gauss rule, which is the maximum.
-    weight = min(weight, 4.0 / 9.0)
-    x = 0.5 / np.sqrt(3.0 * (1.0 - weight))
-    outer = 0.5 * (1.0 - weight)
-    return np.array([0.5 - x, 0.5, 0.5 + x]), np.array([outer, weight, outer])
-
-
-def _square(across):
-    """The largest E I about the centroid over E A."""
-    if across.simple:
-        return across.mesh.height**2 / 12.0
-    EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
-    return float(np.max((EI - ES**2 / EA) / EA))
-
-
 def _unit(element, points):
     """Derivatives of the axis by xi at each point, the first and the second, (rows, nb), and the
     powers of the length with which they are those by X, (rows,)."""
@@ -251,15 +234,6 @@ def _samples(n, moduli):
     return pattern_of(CABLE, rows, pairs[:, order]), order
 
 
-def _has_alone(mesh):
-    """True if an element has no neighbour."""
-    t = mesh.t
-    if mesh.is_chain:
-        return t.shape[1] == 1
-    joined = t[0, 1:] == t[1, :-1]
-    return not np.all(np.append(False, joined) | np.append(joined, False))
-
-
 class CableKernel(ElementKernel):
     """The kernel of a cable; ``points`` (points,) are its Gauss points on [0, 1]."""
 
@@ -270,9 +244,20 @@ class CableKernel(ElementKernel):
         n = formulation.points_along(element, across.layers[0].material)
         if n == 2:
             alpha, length = getattr(formulation, "alpha", 1.0), float(mesh.chain_lengths.min())
-            self._rule = softened(alpha * MIDDLE * _square(across) / length**2)
+            if across.simple:
+                square = mesh.height**2 / 12.0
+            else:
+                EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
+                square = float(np.max((EI - ES**2 / EA) / EA))  # E I about the centroid
+            # exact for cubics: two Gauss points and a weighted middle one; a weight of 4/9 gives
+            # the three-point Gauss rule, which is the maximum
+            middle = min(alpha * MIDDLE * square / length**2, 4.0 / 9.0)
+            x, outer = 0.5 / np.sqrt(3.0 * (1.0 - middle)), 0.5 * (1.0 - middle)
+            self._rule = np.array([0.5 - x, 0.5, 0.5 + x]), np.array([outer, middle, outer])
         else:
-            if self.constant is None and _has_alone(mesh):
+            joined = mesh.t[0, 1:] == mesh.t[1, :-1]
+            alone = ~(np.append(False, joined) | np.append(joined, False))
+            if self.constant is None and alone.any():
                 n = max(n, element.axis_degree)  # no neighbour stabilises modes of fewer points
             self._rule = gauss(n)
         self.points, self._across = self._rule[0], across

@@ -42,7 +42,18 @@ class Pattern:
 
     def __init__(self, kind: int, rows: Array, pairs: Array) -> None:
         self.kind, self.rows, self.pairs, self.ns = kind, rows, pairs, rows.shape[1]
-        self.products, self.terms, self.of = _products(rows, pairs)
+        (g, h), size, row = rows, self.ns, rows.ravel()
+        ends = [[s] if g[s] == h[s] else [s, size + s] for s in range(size)]
+        terms = [(*sorted((a, b), key=lambda c: row[c]), q)
+                 for q, (s, t) in enumerate(pairs.T)
+                 for a in ends[s] for b in ends[t] if s < t or a <= b]
+        of, found = (np.sort(x, axis=0) for x in (rows, row[np.transpose(terms)[:2]]))
+        self.products = np.unique(np.concatenate([of, found], axis=1), axis=1).copy()
+        number = {tuple(x): k for k, x in enumerate(self.products.T.tolist())}
+        numbers = [[number[tuple(x)] for x in y.T.tolist()] for y in (found, of)]
+        terms = sorted((p, *x) for p, x in zip(numbers[0], terms))
+        self.terms = np.transpose(np.array(terms, np.int64)).copy()
+        self.of = np.array(numbers[1], np.int64)
 
     @cached_property
     def ends(self) -> tuple[Array, ...]:
@@ -97,29 +108,6 @@ class StrainTables(NamedTuple):
     @property
     def kind(self) -> int:
         return self.pattern.kind
-
-    @property
-    def rows(self) -> Array:
-        return self.pattern.rows
-
-    @property
-    def pairs(self) -> Array:
-        return self.pattern.pairs
-
-
-def _products(rows, pairs):
-    (g, h), size = rows, rows.shape[1]
-    ends = [[s] if g[s] == h[s] else [s, size + s] for s in range(size)]
-    row = np.concatenate([g, h])
-    terms = [(*sorted((a, b), key=lambda c: row[c]), q)
-             for q, (s, t) in enumerate(pairs.T)
-             for a in ends[s] for b in ends[t] if s < t or a <= b]
-    of, found = (np.sort(x, axis=0) for x in (np.array([g, h]), row[np.transpose(terms)[:2]]))
-    products = np.unique(np.concatenate([of, found], axis=1), axis=1).copy()
-    number = {tuple(x): k for k, x in enumerate(products.T.tolist())}
-    numbers = [[number[tuple(x)] for x in y.T.tolist()] for y in (found, of)]
-    terms = sorted((p, *x) for p, x in zip(numbers[0], terms))
-    return products, np.transpose(np.array(terms, np.int64)).copy(), np.array(numbers[1], np.int64)
 
 
 def pattern_of(kind: int, rows: Array, pairs: Array) -> Pattern:
@@ -219,7 +207,7 @@ def points_of(t: StrainTables) -> tuple[Any, ...]:
         return ()
     law = _LAWS[t.law.handle]
     if t.law.kind == HISTORY:
-        return law.functions(t.kind == CABLE)
+        return law.functions(t.pattern.kind == CABLE)
     return (law.point if t.law.kind == POINTWISE else None,)
 
 
