@@ -31,7 +31,7 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
     """Lines and points of a drawing as a meshio mesh, with a cell set for each layer."""
     import meshio
 
-    ezdxf = require_module("ezdxf", "dxf")
+    ezdxf, units = require_module("ezdxf", "dxf"), require_module("ezdxf.units", "dxf")
     with retold((OSError, ezdxf.DXFError), "{} cannot be read as a drawing: {error}", path,
                 error=FileError):
         drawing = ezdxf.readfile(path)
@@ -51,27 +51,20 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
                    "polylines", path, kind, entity.dxf.layer, error=MeshError)
     refuse(not lines, "{} has no lines and no polylines", path, error=MeshError)
     at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
-    at = at * _scale(drawing.units, unit, path)
+    stated = units.decode(drawing.units) if drawing.units else None  # $INSUNITS
+    if unit is None:
+        logger.info("%s is taken as drawn, %s; unit='m' converts its coordinates to metres", path,
+                    f"in {stated}" if stated else "in a unit that it does not state")
+    else:
+        target = getattr(units, require_option("unit of length", unit, UNITS).upper())
+        refuse(stated is None, "{} does not state its unit ($INSUNITS is {}): leave out unit={!r}",
+               path, drawing.units, unit)
+        at = at * units.conversion_factor(drawing.units, target)
     ends, alone = np.split(number.ravel(), [2 * len(lines)])
     layers, of = np.array(lines), np.array([name for name, _ in points])
     return meshio.Mesh(at, [("line", ends.reshape(-1, 2)), ("vertex", alone[:, None])], cell_sets={
         name: [np.flatnonzero(layers == name), np.flatnonzero(of == name)]
         for name in dict.fromkeys([*lines, *of.tolist()])})
-
-
-def _scale(code, unit, path):
-    """The factor from the unit of a drawing, a number of $INSUNITS, to another one."""
-    from ezdxf import units
-
-    stated = units.decode(code) if code else None
-    if unit is None:
-        logger.info("%s is taken as drawn, %s; unit='m' converts its coordinates to metres", path,
-                    f"in {stated}" if stated else "in a unit that it does not state")
-        return 1.0
-    target = getattr(units, require_option("unit of length", unit, UNITS).upper())
-    refuse(stated is None, "{} does not state its unit ($INSUNITS is {}): leave out unit={!r}",
-           path, code, unit)
-    return units.conversion_factor(code, target)
 
 
 #: Line cells of meshio: the ends first, then interior points in order.
@@ -126,21 +119,18 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
 def _mesh_of(mesh, unit):
     import meshio
 
-    if isinstance(mesh, (str, Path)):
-        path = require_path("mesh", mesh)
-        if path.suffix.lower() == ".dxf":
-            return mesh_of_dxf(path, unit)
+    path = require_path("mesh", mesh) if isinstance(mesh, (str, Path)) else None
+    if path is not None and path.suffix.lower() == ".dxf":
+        return mesh_of_dxf(path, unit)
+    if path is not None:
         with retold((Exception, SystemExit),  # meshio exits on an unknown format
                     "{} cannot be read as a mesh: {error}", path, error=FileError):
             mesh = meshio.read(path)
-        if path.suffix.lower() == ".inp":
-            _require_sets_of_abaqus(path)
     refuse(unit is not None, "unit={!r} is for drawings in DXF, which state theirs", unit)
-    return require_kind("mesh", mesh, meshio.Mesh, " of meshio or the name of a file")
-
-
-def _require_sets_of_abaqus(path):
-    """Raise MeshError for element sets of an Abaqus file that meshio 5 misreads."""
+    require_kind("mesh", mesh, meshio.Mesh, " of meshio or the name of a file")
+    if path is None or path.suffix.lower() != ".inp":
+        return mesh
+    # element sets of an Abaqus file that meshio 5 misreads
     blocks, sets, keyword = [], [], ""
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         if line.startswith("*"):
@@ -159,6 +149,7 @@ def _require_sets_of_abaqus(path):
     refuse(again or blocks[:len(named)] != named, "{}: write *ELSET with the numbers of all its "
            "elements: {}", path, f"{again[0]!r} is there twice" if again else
            "an *ELEMENT has no set before one that has", error=MeshError)
+    return mesh
 
 
 def _ends_first(points, cell):

@@ -203,9 +203,9 @@ class FrameGraph:
         if np.any(on):
             node, line = node[on][0], some[k[on][0]]
             more = f", and {np.sum(on) - 1} other(s) likewise" if np.sum(on) > 1 else ""
-            warn(f"the node {node} at {_at(self.points[:, node])} is on line {line} between its "
-                 f"ends{more}, and not joined to it: divide the line there if it should be",
-                 ModelWarning)
+            warn("the node {} at ({:.9g}, {:.9g}) is on line {} between its ends{}, and not joined "
+                 "to it: divide the line there if it should be".format(
+                     node, *self.points[:, node], line, more), ModelWarning)
 
     def _merge(self, tol):
         n, places = self.points.shape[1], self.points
@@ -218,10 +218,9 @@ class FrameGraph:
         pairs = pairs[np.lexsort(pairs.T[::-1])]
         apart = np.hypot(*(places[:, pairs[:, 0]] - places[:, pairs[:, 1]]))
         one = (apart <= self.tol * (1.0 + 1e-9)) & (self.tol > 0.0)
-        for (i, j), d in zip(pairs[~one], apart[~one]):
-            if d <= NEAR * self.size:
-                raise MeshError(f"the points {i} and {j} are both at {_at(places[:, i])}: give "
-                                "tol= to make them one")
+        refuse_any(apart[~one] <= NEAR * self.size, "the points {} and {} are both at {:.9g}: give "
+                   "tol= to make them one", *pairs[~one].T, places[:, pairs[~one, 0]],
+                   error=MeshError)
         joined = sparse.coo_array((np.ones(int(one.sum())), pairs[one].T), (n, n))
         _, label = connected_components(joined, directed=False)
         _, first = np.unique(label, return_index=True)
@@ -356,10 +355,6 @@ def _named(kind, what, given, n):
         refuse_any((found < 0) | (found >= n), "{!r} holds the number {}: the {} are numbered 0 to "
                    "{}", name, found, what, n - 1, error=MeshError)
     return out
-
-
-def _at(x):
-    return f"({x[0]:.9g}, {x[1]:.9g})"
 
 
 def _warn_of(pairs, apart, what):

@@ -48,11 +48,6 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
     return float(np.max(heights)), heights, height
 
 
-def powers(heights: Array) -> Array:
-    """Coefficients of 1, xi, xi^2, xi^3 from heights; both of shape (4, nelements)."""
-    return np.linalg.solve(np.vander(PLACES, increasing=True), heights)
-
-
 def halved(heights: Array, marked: Array) -> Array:
     """Heights (4, nelements) after halving the ``marked`` elements."""
     left, right = (lagrange(PLACES, a + 0.5 * PLACES) @ heights[:, marked] for a in (0.0, 0.5))
@@ -136,7 +131,8 @@ class MappingBeam(Mapping):
         #: Degree of the height in xi: 0 if it is constant.
         self.height_degree = 0
         if mesh.heights is not None:
-            self.heights = c = powers(mesh.heights) / mesh.height
+            self.heights = c = np.linalg.solve(
+                np.vander(PLACES, increasing=True), mesh.heights) / mesh.height
             c[np.abs(c) <= NOTHING] = 0.0  # for a linear height
             self.height_degree = int(np.max(np.nonzero(np.any(c, axis=1))))
 

@@ -128,9 +128,8 @@ class Finder:
                 h = self.mesh.height if self.mesh.heights is None else (
                     self.mapping.height(xi[:, None], e)[0][:, 0])
                 X = np.array([xi, 0.5 + across / h])
-                outside = np.maximum(*np.abs(X - 0.5)) - 0.5
-                outside[outside < noise] = 0.0
-                return e, np.minimum(np.maximum(X, 0.0), 1.0), outside, np.zeros(n, dtype=bool)
+                return (e, np.minimum(np.maximum(X, 0.0), 1.0), self._outside(X, noise),
+                        np.zeros(n, dtype=bool))
             if chain is not None or not self.is_chain:
                 return self._best(x, noise, *self._pairs(x, chain))
             found = self._best(x, noise, np.arange(n), self._tree.query(x.T)[1] // SAMPLES)
