@@ -290,9 +290,17 @@ class PointLocator:
             beam = select_beam(self.beams, beam)
             points = as_point(points, beam.mesh)
         if self.bodies:
-            found = self._of_body(points, beam)
-            if found is not None:
-                return found
+            if isinstance(points, RigidBody):
+                points, beam = points.position, points
+            if beam is not None or not self.beams and len(self.bodies) == 1:
+                body = select_member(self.beams, self.bodies, beam)
+                if isinstance(body, (RigidBody, Domain)):
+                    if points is None and isinstance(body, RigidBody):
+                        points = body.position
+                    x = as_points(points)
+                    start = x.reshape(2, -1)
+                    return Located(x.ndim == 1, start.shape[1],
+                                   [self._in_body(body, None, start)])
         if isinstance(points, (int, float)):
             as_points(points)  # raises: x and y were given as two arguments
         if beam is not None:
@@ -346,18 +354,6 @@ class PointLocator:
         numbers = sorted(chain if self._lines is None else int(
             self._lines[self._chains[self.beams.index(b)] + chain]) for b, chain in found)
         raise InputError(f"{where}lines {numbers}: choose one, as line={numbers[0]}")
-
-    def _of_body(self, points, beam):
-        if isinstance(points, RigidBody):
-            points, beam = points.position, points
-        elif beam is None and (self.beams or len(self.bodies) > 1):
-            return None
-        body = select_member(self.beams, self.bodies, beam)
-        if not isinstance(body, (RigidBody, Domain)):
-            return None
-        x = as_points(body.position if points is None and isinstance(body, RigidBody) else points)
-        start = np.reshape(x, (2, -1))
-        return Located(x.ndim == 1, start.shape[1], [self._in_body(body, None, start)])
 
     def _in_body(self, body, index, start):
         kind = DomainPoints if isinstance(body, Domain) else BodyPoints

@@ -110,7 +110,9 @@ class Interpolation:
         self.table = mesh.height ** swell[:, None, None] * unit
         n = p + mapping.height_degree * int(swell.max())
         self.shape, self.swell = (n, m), swell
-        self.by_xi, self.by_eta = _slope_matrix(n), _slope_matrix(m)
+        #: Matrices from Chebyshev coefficients to those of the derivative.
+        self.by_xi, self.by_eta = (
+            np.vstack([2.0 * chebder(np.eye(k)), np.zeros(k)]) for k in (n, m))
         self.slope = element.local(np.zeros((2, 1)), 1.0)[3]
 
     def height_at(self, e: Array, xi: Array) -> Any:
@@ -144,12 +146,6 @@ def places(n: int) -> Array:
 def transform(n: int) -> Array:
     """Matrix (n, n) from values at :func:`places` to Chebyshev coefficients."""
     return np.linalg.inv(chebvander(2.0 * places(n) - 1.0, n - 1))
-
-
-def _slope_matrix(n):
-    out = np.zeros((n, n))
-    out[:-1] = 2.0 * chebder(np.eye(n))
-    return out
 
 
 class Gradients:

@@ -136,7 +136,7 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
         Q = np.ascontiguousarray((both.take(two, 0) - both.take(opposite, 0)).compress(g != h, 1))
     along, mixing = map(_sparse, (
         t.along, t.along[:0] if t.law.kind == LINEAR else to_moduli(
-            t.pattern, t.weights.shape[1], t.along.tobytes())))
+            t.pattern, t.weights.shape[1], t.along)))
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
         compiled_pattern(pattern), pattern.kind, W, t.start, np.ascontiguousarray(G[0]),

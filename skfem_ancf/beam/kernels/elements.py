@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, cached_property, primitive
+from ...core import Array, array_cache, cached_property, primitive
 from .tables import (CABLE, HISTORY, LINEAR, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, Pattern,
                      StrainTables, conserve, law_evaluate)
 
@@ -52,30 +52,25 @@ def scaled(G: Array) -> tuple[Array, Array, Array]:
 def _entries(m: int) -> Any:
     """Lower half of an element matrix with the left node's position, from its parts."""
     # Returns rows, columns and signs of the entries; functions (without the left node's) and part
-    # of each: xx, yy, or xy, the component x of the first and y of the second function.
+    # of each: xx, yy, or xy, the component x of the first and y of the second function; and their
+    # positions in the parts of :meth:`Elements.matrices`, stacked.
     i, j = np.tril_indices(2 * m + 2)
     (k, x), (l, y) = divmod(i, 2), divmod(j, 2)
     sign = np.where(k == 0, -1.0, 1.0) * np.where(l == 0, -1.0, 1.0)
     k, l = np.where(k == 0, m // 2, k - 1), np.where(l == 0, m // 2, l - 1)
     swap = x > y  # the entry of y and x is that of x and y with functions exchanged
-    return i, j, sign, np.where(swap, l, k), np.where(swap, k, l), np.where(x == y, x, 2)
-
-
-@lru_cache(64)
-def _of_products(m: int) -> Array:
-    """Positions of the entries in the parts of :meth:`Elements.matrices`, stacked."""
-    _, _, _, k, l, part = _entries(m)
+    k, l, part = np.where(swap, l, k), np.where(swap, k, l), np.where(x == y, x, 2)
     high, low, n = np.maximum(k, l), np.minimum(k, l), m * (m + 1) // 2
     number = high * (high + 1) // 2 + low
-    return np.where(part < 2, 3 * number + part, (3 + (k < l)) * n + number)
+    return i, j, sign, k, l, part, np.where(
+        part < 2, 3 * number + part, (3 + (k < l)) * n + number)
 
 
-@lru_cache(64)
-def _to_rows(terms: bytes, rows: int) -> Any:
+@array_cache(64)
+def _to_rows(k: Array, l: Array, rows: int) -> Any:
     """Sparse matrix from coefficients (4 n,) to W (3 rows^2,) of xx, yy and xy between rows."""
     from scipy import sparse
 
-    k, l = np.frombuffer(terms, np.int64).reshape(2, -1)
     n, one = len(k), np.arange(len(k))
     to = np.concatenate([part * rows**2 + a * rows + b for part, a, b in (
         (0, k, l), (0, l, k), (1, k, l), (1, l, k), (2, k, l), (2, l, k))])
@@ -83,13 +78,13 @@ def _to_rows(terms: bytes, rows: int) -> Any:
     return sparse.csr_matrix((np.ones(6 * n), (to, of)), shape=(3 * rows**2, 4 * n))
 
 
-@lru_cache(64)
-def to_moduli(pattern: Pattern, points: int, along: bytes) -> Any:
+@array_cache(64)
+def to_moduli(pattern: Pattern, points: int, along: Array) -> Any:
     """Sparse matrix from moduli at the points (9 points, of fibres points) to those between samples
     (nq)."""
     from scipy import sparse
 
-    (s, z), A = pattern.pairs, np.frombuffer(along).reshape(-1, points, pattern.ns)
+    (s, z), A = pattern.pairs, along.reshape(-1, points, pattern.ns)
     c, n = np.abs(A).sum(axis=1).argmax(axis=0), len(A)  # component of each sample
     M = np.zeros((len(s), n * n, A.shape[1]))
     M[np.arange(len(s)), n * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
@@ -110,6 +105,7 @@ class Elements:
         self.start, self.rest = t.start, self.measured(self.x)
         self._second, self._sample, self._row, self._direction = t.pattern.ends
         self._last_rows: tuple[Any, ...] = ()  # displacements, with the results of :meth:`at`
+        self._at_band: dict[int, Array] = {}  # flat positions of the lower halves in a band
         # relative DOFs (2 m, ne)
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]
@@ -254,7 +250,7 @@ class Elements:
     @cached_property
     def _to_moduli(self):
         """Sparse matrix from moduli at the points (9 points) to those between samples (nq)."""
-        return to_moduli(self.t.pattern, self.t.weights.shape[1], self.t.along.tobytes())
+        return to_moduli(self.t.pattern, self.t.weights.shape[1], self.t.along)
 
     def _moduli_of_samples(self, D):
         """Moduli (nq, ne) between samples from those at the points, as if they were symmetric."""
@@ -369,7 +365,7 @@ class Elements:
         """Element matrices Q of coefficients, in parts for :func:`_entries`."""
         if self.own:
             rows, (_, _, _, k, l, _, _) = self.G.shape[1], self._terms
-            to = _to_rows(np.array([k, l], np.int64).tobytes(), rows)
+            to = _to_rows(k, l, rows)
             W = (to @ np.concatenate([w[:, 0], w[:, 1], xy, yx])).T.reshape(self.ne, -1, rows)
             WG = np.matmul(W, self.G).reshape(self.ne, 3, rows, self.m)
             return np.matmul(self.G.transpose(0, 2, 1)[:, None], WG)
@@ -380,15 +376,15 @@ class Elements:
 
     def lower(self, K: Array) -> Array:
         """Entries of the lower half with the left node's position, (entries, ne)."""
-        _, _, sign, k, l, part = _entries(self.m)
+        _, _, sign, k, l, part, place = _entries(self.m)
         if self.own:
             at = (part * self.m + k) * self.m + l
             return K.reshape(self.ne, -1).take(at, axis=1).T * sign[:, None]
-        return K.take(_of_products(self.m), 0, None, CLIP) * self._signs
+        return K.take(place, 0, None, CLIP) * self._signs
 
     @cached_property
     def _signs(self):
-        _, _, sign, k, l, _ = _entries(self.m)
+        _, _, sign, k, l, *_ = _entries(self.m)
         return sign[:, None] * self.D[k, 0] * self.D[l, 0]
 
     def tangent(self, one: Any, Y: Array, T: Array, moduli: Array | None) -> Array:
@@ -423,19 +419,10 @@ class Elements:
     def add_to_band(self, K: Array, flat: Array, ld: int) -> None:
         """Add lower halves (entries, ne) to a band, entry (i, j) at ``flat[j * ld + i - j]``."""
         first, last = self._span.start * ld, min(self._span.stop * ld, len(flat))
-        flat[first:last] += np.bincount(self._positions(ld), K.ravel(), last - first)
-
-    def _positions(self, ld):
-        """Positions of the lower halves in a band, flat."""
         if ld not in self._at_band:
-            i, j, *_ = _entries(self.m)
-            start = self.t.start - self._span.start
+            (i, j, *_), start = _entries(self.m), self.t.start - self._span.start
             self._at_band[ld] = ((start + j[:, None]) * ld + (i - j)[:, None]).ravel()
-        return self._at_band[ld]
-
-    @cached_property
-    def _at_band(self):
-        return {}
+        flat[first:last] += np.bincount(self._at_band[ld], K.ravel(), last - first)
 
     # derivatives
 

@@ -300,7 +300,7 @@ def remembering(elements: Sequence[Elements], past: Past) -> list[Elements]:
 SAME = 1e-12
 #: What copies of elements share.
 CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_reach_of_pairs", "_ends",
-            "_products", "_signs", "_at_band")
+            "_products", "_signs")
 
 
 class ElementsWithHistory(Elements):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, first_order, gauss, lagrange, product_rule, refuse
+from ...core import Array, array_cache, first_order, gauss, lagrange, product_rule, refuse
 from ...elements.base import ElementBeam
 from ...formulations import Formulation, Term
 from ...materials.history import HistoryMaterial
@@ -74,7 +74,7 @@ class SectionKernel(ElementKernel):
         linear, means = law.kind == LINEAR, len(eta) if term.section_samples is None else tuple(
             map(tuple, np.asarray(term.section_samples[1]).tolist()))
         A, pairs, products, sizes = _mixing(samples, tuple(nodes), axis, means, (
-            law.D != 0.0).tobytes() if linear else b"\1" * 9)
+            law.D != 0.0) | (not linear))
         H, along = weights @ products, np.zeros((0, A.shape[1]))
         if linear:
             keep = (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ sizes)).any(axis=0)
@@ -186,20 +186,20 @@ def _rows(mesh, element, samples, tind):
     return G[:, :, 1:], frame
 
 
-@lru_cache(64)
+@array_cache(64)
 def _mixing(samples, nodes, axis, means, coupled):
     """Matrix A (points, ns) from the samples to the integration points, pairs s <= t of samples
     that the law couples (2, nq), and the products of their columns and the sizes of these.
 
     ``nodes`` and ``axis`` are axial coordinates of the samples of each component, and of the
     integration points; ``means`` are the weights of the samples across, or their number if these
-    are the points. ``coupled`` are the bytes of a matrix (3, 3): which components are.
+    are the points. ``coupled`` is a matrix (3, 3): which components are.
     """
     across = np.eye(means) if isinstance(means, int) else np.array(means)
     A = np.concatenate([np.kron(np.eye(len(axis)) if at == axis else lagrange(at, axis), across)
                         for at in nodes], axis=1)
     c, size, row = samples.component, np.abs(A), np.arange(A.shape[1])
-    both = np.frombuffer(coupled, bool).reshape(3, 3)[c[:, None], c] & (size.T @ size > 0.0)
+    both = coupled[c[:, None], c] & (size.T @ size > 0.0)
     pairs = np.array((both & (row[:, None] < row) | (row[:, None] == row)).nonzero())
     products = A[:, pairs[0]] * A[:, pairs[1]]
     return A, pairs, products, np.abs(products)

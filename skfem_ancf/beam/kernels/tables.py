@@ -17,13 +17,13 @@ rest is a matrix product.
 
 import weakref
 from collections.abc import Sequence
-from functools import lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import F1, F2, F3, I1, I2, Array, apart, cached_property, indices, primitive
+from ...core import (F1, F2, F3, I1, I2, Array, apart, array_cache, cached_property, indices,
+                     primitive)
 from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
 from ...materials.history import AtRest
@@ -110,15 +110,10 @@ class StrainTables(NamedTuple):
         return self.pattern.kind
 
 
+@array_cache(64)
 def pattern_of(kind: int, rows: Array, pairs: Array) -> Pattern:
     """The :class:`Pattern` of samples; the same object for equal ones."""
-    return _pattern(kind, rows.shape[1], rows.tobytes(), pairs.tobytes())
-
-
-@lru_cache(64)
-def _pattern(kind, size, rows, pairs):
-    return Pattern(kind, *(np.frombuffer(x, np.int64).reshape(2, -1).copy() for x in (
-        rows, pairs)))
+    return Pattern(kind, rows, pairs)
 
 
 def separated(t: StrainTables) -> StrainTables:
