@@ -321,13 +321,11 @@ class Beam(Immutable):
 
     def strain(self, u: Array, X: Array, tind: Array | None = None) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), (3, nelements, npoints)."""
-        u, X, tind = self._checked(u, X, tind)
-        return on_grid(strain_at, self, u, X, tind)
+        return on_grid(strain_at, self, *self._checked(u, X, tind))
 
     def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), (3, nelements, npoints)."""
-        u, X, tind = self._checked(u, X, tind)
-        return on_grid(stress_at, self, u, X, tind)
+        return on_grid(stress_at, self, *self._checked(u, X, tind))
 
     def _checked(self, u, X, tind):
         u, X = require_finite("u", u, (self.N,)), require_finite("X", X)

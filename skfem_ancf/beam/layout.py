@@ -4,7 +4,7 @@ numbers. Several points are an array (2, n), as in scikit-fem, or a list of poin
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -77,40 +77,31 @@ class Layout:
 
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
     """A beam by object, name or number; None for the only one."""
-    if beam is None and len(beams) == 1:
-        return beams[0]
-    found: Sequence[Beam] = ()
-    if isinstance(beam, Beam):
-        found = [b for b in beams if b is beam]
-    elif isinstance(beam, str):
-        found = [b for b in beams if b.name == beam]
-    elif isinstance(beam, int) and not isinstance(beam, bool) and beam >= 0:
-        found = list(beams[beam:beam + 1])
-    if found:
-        return found[0]
-    known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
-    refuse(not beams, "a beam is needed here, and the scene has none: give one of its members, its "
-           "name or its number; got {!r}", beam)
-    refuse(beam is None, "the scene has {} beams: choose one with beam=, of {}", len(beams), known)
-    refuse(isinstance(beam, (RigidBody, Domain)), "a beam is needed here, got {!r}; beams are {}",
-           beam, known)
-    raise NameUnknown("beam", beam, known)
+    return cast("Beam", select_member(beams, (), beam))
 
 
 def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody | Domain],
                   which: WhichMember) -> Beam | RigidBody | Domain:
     """A beam, or a rigid body or domain, numbered after the beams; None for the only one."""
-    if which is None and not beams and len(bodies) == 1:
-        return bodies[0]
-    if which is None or not bodies:
-        return select_beam(beams, which)
-    members = *beams, *bodies
-    if isinstance(which, (RigidBody, Domain)):
-        if any(b is which for b in bodies):
-            return which
-        raise NameUnknown("rigid body or domain", which, [b.name or len(beams) + k
-                                                for k, b in enumerate(bodies)])
-    return select_beam(members, which)  # type: ignore[arg-type]
+    members: Sequence[Any] = beams if which is None and beams else (*beams, *bodies)
+    found: Sequence[Any] = [one for one in members if one is which]
+    if which is None:
+        found = members if len(members) == 1 else ()
+    elif isinstance(which, str):
+        found = [one for one in members if one.name == which]
+    elif isinstance(which, int) and not isinstance(which, bool) and which >= 0:
+        found = members[which:which + 1]
+    if found:
+        return found[0]
+    known = [one.name if one.name is not None else k for k, one in enumerate(members)]
+    if bodies and isinstance(which, (RigidBody, Domain)):
+        raise NameUnknown("rigid body or domain", which, known[len(beams):])
+    refuse(not beams and (which is None or not bodies), "a beam is needed here, and the scene has "
+           "none: give one of its members, its name or its number; got {!r}", which)
+    refuse(which is None, "the scene has {} beams: choose one with beam=, of {}", len(beams), known)
+    refuse(isinstance(which, (RigidBody, Domain)), "a beam is needed here, got {!r}; beams are {}",
+           which, known)
+    raise NameUnknown("beam", which, known)
 
 
 def as_points(points: Any) -> Array:
@@ -127,10 +118,6 @@ def as_points(points: Any) -> Array:
     return require_point(points)
 
 
-#: Tolerance of points on the axis of a cable, relative to the height.
-ON_AXIS = 1e-12
-
-
 class BeamPoints:
     """Points ``X`` (2, n) of the reference cells of elements ``e`` (n,) of one beam. Among the
     requested points they have the numbers ``index`` (n,), None if they are all."""
@@ -142,7 +129,7 @@ class BeamPoints:
         #: Points of the reference cell in the shape (2, n, 1).
         self.at = X[:, :, None]
         #: A point is off the axis of a cable, where positions are nonlinear.
-        self.off_axis = not beam.has_sections and bool((np.abs(X[1] - 0.5) > ON_AXIS).any())
+        self.off_axis = not beam.has_sections and bool((np.abs(X[1] - 0.5) > 1e-12).any())
 
     @cached_property
     def start(self) -> Array:
@@ -367,8 +354,8 @@ class PointLocator:
         several, parts = np.zeros(x.shape[1], dtype=bool), list[Any]()
         for k, candidate in enumerate(self.beams):
             finder = candidate.finder
-            x0, x1, y0, y1 = finder.box
-            near = np.flatnonzero((x0 <= x[0]) & (x[0] <= x1) & (y0 <= x[1]) & (x[1] <= y1))
+            low, high = finder.box
+            near = np.flatnonzero(((low <= x) & (x <= high)).all(axis=0))
             if not len(near):
                 continue
             e, X, outside, tied = finder.find(x[:, near])

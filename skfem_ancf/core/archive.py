@@ -14,8 +14,6 @@ import numpy as np
 from .errors import FileError, retold
 from .types import Array, ArrayLike, StrPath
 
-#: Longest stem of a temporary file's name; names are limited to 255 characters.
-STEM = 100
 #: NumPy kinds of arrays in files.
 KINDS = "biufcUS"
 
@@ -51,7 +49,8 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
     """A new, empty file that replaces ``path`` when the block ends, or is removed on an error."""
     # Links are not followed, and the file mode is kept. With ``durable`` the new file, of the same
     # suffix, is synchronised to disk first.
-    new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
+    # names are limited to 255 characters
+    new = path.with_name(f".{path.stem[:100]}.{token_hex(8)}.part{path.suffix}")
     new.touch(0o600 if path.is_file() else 0o666, exist_ok=False)
     try:
         yield new

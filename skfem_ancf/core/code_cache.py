@@ -51,11 +51,10 @@ class NotCompiled(Exception):
     """A user's function that Numba cannot compile."""
 
 
-#: Lines of files that are compiled, and names of others on which compiled code depends.
+#: Lines of files that are compiled.
 _MARKS = re.compile(rb"^\s*(@source|@primitive|@apart|import numba|from (numba|\.+source) |"
                     rb"from \.+core import (\([^)]*|[^(\n]*)"
                     rb"\b(source|primitive|apart|indices|[FI][123])\b)", re.MULTILINE)
-_ALSO = "loops.py"
 
 
 @cache
@@ -64,7 +63,7 @@ def compiled_files() -> dict[Path, bytes]:
     package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
     texts = {path: path.read_bytes() for path in sorted(package.rglob("*.py"))}
     return {path: text for path, text in texts.items()
-            if path.name == _ALSO or _MARKS.search(text)}
+            if path.name == "loops.py" or _MARKS.search(text)}
 
 
 @cache

@@ -5,7 +5,7 @@ therefore called by address."""
 
 import pickle
 from ctypes import CFUNCTYPE, c_double, c_int64, c_void_p, cast
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -148,23 +148,18 @@ def load_part(part: str) -> None:
     for function, one in APART.items():
         if one.part == part:
             load(function)
-            FROM_PYTHON[function] = _from_python(function)
+            FROM_PYTHON[function] = partial(_call_entry, function, [])
 
 
-def _from_python(function):
-    """A function that calls the :func:`entry` of another, with exceptions of callbacks."""
-    made: list[Any] = []
-
-    def call(tables, *args):
-        if not made:
-            made.append(entry(function, (tables, *args)))
-        words = Packed(tables)
-        with deferred():
-            found = made[0](words.address, *args)
-        raise_kept()
-        return found
-
-    return call
+def _call_entry(function, made, tables, *args):
+    """Call the :func:`entry` of a function, which is made once, with exceptions of callbacks."""
+    if not made:
+        made.append(entry(function, (tables, *args)))
+    words = Packed(tables)
+    with deferred():
+        found = made[0](words.address, *args)
+    raise_kept()
+    return found
 
 
 class Record(types.NamedTuple):

@@ -19,10 +19,6 @@ from .frame_graph import FrameGraph
 
 logger = logging.getLogger(__name__)
 
-#: Entities that are not straight lines, which are refused.
-CURVES = ("ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
-
-
 #: Units of length in which drawings can be read.
 UNITS = "m", "mm", "cm", "dm", "km", "in", "ft", "yd"
 
@@ -47,8 +43,9 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
                 lines.append(entity.dxf.layer)
             elif kind == "POINT":
                 points.append((entity.dxf.layer, part.dxf.location.xyz))
-            refuse(kind in CURVES, "{} has {} in the layer {!r}: explode blocks, draw curves as "
-                   "polylines", path, kind, entity.dxf.layer, error=MeshError)
+            refuse(kind in ("ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT"), "{} has {} in the "
+                   "layer {!r}: explode blocks, draw curves as polylines", path, kind,
+                   entity.dxf.layer, error=MeshError)
     refuse(not lines, "{} has no lines and no polylines", path, error=MeshError)
     at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
     stated = units.decode(drawing.units) if drawing.units else None  # $INSUNITS

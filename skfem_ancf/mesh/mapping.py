@@ -21,9 +21,6 @@ SECTIONS = ("linear", "cubic", "quintic", "septic",
 #: Axial coordinates of the heights of an element, and points between at which the fit is checked.
 PLACES, BETWEEN = np.arange(4) / 3.0, (1.0 + 2.0 * np.arange(3)) / 6.0
 
-#: Largest relative error of the fit.
-FITS = 0.02
-
 
 def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
     return factor * np.asarray(function(s))
@@ -43,7 +40,7 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
                found.ravel(), at.ravel(), error=MeshError)
     heights, between = found[:4].copy(), found[4:]
     gap = np.max(np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between, axis=0)
-    refuse_any(gap > FITS, "the height in element {k}, from {:.6g} to {:.6g}, differs from a cubic "
+    refuse_any(gap > 0.02, "the height in element {k}, from {:.6g} to {:.6g}, differs from a cubic "
                "by {:.1%}: use more elements, with a node at a kink", a, b, gap, error=MeshError)
     return float(np.max(heights)), heights, height
 

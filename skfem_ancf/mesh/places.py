@@ -213,11 +213,11 @@ class Finder:
         return out
 
     @cached_property
-    def box(self) -> tuple[float, float, float, float]:
-        """A bounding box of the body: least and largest x, least and largest y."""
+    def box(self) -> tuple[Array, Array]:
+        """Least and largest coordinates of a bounding box of the body, (2, 1) each."""
         middle, radius = self._circles
-        (x0, y0), (x1, y1) = np.min(middle - radius, axis=1), np.max(middle + radius, axis=1)
-        return float(x0), float(x1), float(y0), float(y1)
+        return ((middle - radius).min(axis=1, keepdims=True),
+                (middle + radius).max(axis=1, keepdims=True))
 
     @cached_property
     def _line(self):

@@ -33,6 +33,18 @@ class ElementKernel:
         self._ends: Any = (slice(-1), slice(1, None)) if mesh.is_chain else mesh.t
         self.N = self.nd * mesh.p.shape[1]
 
+    def _tables_of(self, pattern, G, frame, H, law, *points, constant=True):
+        """StrainTables of all elements, with the constant stiffness or without; ``points`` are
+        their last three."""
+        n, whole = 2 * self.nd - 2, self.constant if constant else None
+        C = np.zeros((0, n, n)) if whole is None else whole[:, 2:, 2:]
+        each = [len(x) > 1 for x in (G, frame, H, C, points[1])]
+        return StrainTables(
+            pattern, self.nd * self.t[0].astype(np.int64),
+            np.arange(self.t.shape[1])[:, None] * each,
+            *map(np.ascontiguousarray, (G, frame, H, C)), law,
+            *map(np.ascontiguousarray, points))
+
     def gather(self, u: Array, elements: Any = slice(None)) -> Array:
         """Element values (ne, nb, 2) of DOFs (N,)."""
         return u.reshape(-1, self.nd).take(self.t[:, elements].T, 0).reshape(-1, self.nd, 2)
@@ -272,12 +284,10 @@ class Past(NamedTuple):
 
 def history_size(t: StrainTables) -> int:
     """Number of history variables and components of eigenstrain; 0 for elastic laws."""
-    return 0 if t.law.kind != HISTORY else _rows(t) * t.weights.shape[1] * len(t.start)
-
-
-def _rows(t):
-    """Variables of a point, and its components of strain: cables have fibres."""
-    return material_of(t.law).number + (1 if t.pattern.kind == CABLE else 3)
+    if t.law.kind != HISTORY:
+        return 0
+    rows = material_of(t.law).number + (1 if t.pattern.kind == CABLE else 3)
+    return rows * t.weights.shape[1] * len(t.start)
 
 
 def elements_of(t: StrainTables) -> Elements:
@@ -318,7 +328,7 @@ class ElementsWithHistory(Elements):
         self.elastic: Any = None  # moduli (c, c) and stress at zero strain if it is elastic
 
     def _own(self, history, span, now):
-        shape, n = (_rows(self.t), self.t.weights.shape[1], self.ne), self.material.number
+        shape, n = (-1, self.t.weights.shape[1], self.ne), self.material.number
         self.history, self.before = np.split(history.reshape(shape), [n])
         self.now, self.span = now.reshape(shape)[n:], span
 

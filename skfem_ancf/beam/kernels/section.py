@@ -21,7 +21,7 @@ from ...materials.history import HistoryMaterial
 from ...mesh.mesh_beam import MeshBeam
 from ...sections import Across, Layer
 from .kernel import ElementKernel, fibres, strains
-from .tables import CABLE, LINEAR, NO_LAW, OF_WEIGHTS, SECTION, StrainTables, law_tables, pattern_of
+from .tables import CABLE, LINEAR, NO_LAW, OF_WEIGHTS, SECTION, law_tables, pattern_of
 
 #: Relative size of a modulus between samples that is round-off.
 ORTHOGONAL = 1e-14
@@ -48,48 +48,40 @@ class SectionKernel(ElementKernel):
     def __init__(self, across: Across, formulation: Formulation) -> None:
         super().__init__(across.mesh, across.element)
         self.constant = across.stabilisation(formulation)
-        self.tables, self.integrals, self._across = [], [], across
-        rows: dict[Any, Any] = {}
+        self.tables, self.integrals = [], []
+        tind, rows = np.array([0]) if across.uniform else None, dict[Any, Any]()
         for layer, terms in across.terms(formulation):
             for k, term in enumerate(terms):
-                constant = self.constant if not self.tables else None
-                samples, volumes = self._add(layer, term, constant, rows)
+                *nodes, eta, axis = (tuple(np.asarray(x, dtype=float).tolist()) for x in (
+                    *map(term.nodes, ("xx", "yy", "xy")), term.section_nodes, term.axis[0]))
+                samples = samples_of(*nodes, eta)
+                if samples not in rows:
+                    rows[samples] = _rows(across.mesh, across.element, samples, tind)
+                G, frame = rows[samples]
+                whole, (X, W) = len(term.section[0]) == 1, term.quadrature
+                volumes = across.volume(layer, X, W, tind, whole)
+                weights = volumes if layer.grade is None else across.volume(
+                    layer, X, W, tind, whole, "grade")
+                law = law_tables(term.law, self)
+                linear, means = law.kind == LINEAR, (
+                    len(eta) if term.section_samples is None else tuple(
+                        map(tuple, np.asarray(term.section_samples[1]).tolist())))
+                A, pairs, products, sizes = _mixing(samples, tuple(nodes), axis, means, (
+                    law.D != 0.0) | (not linear))
+                H, along = weights @ products, np.zeros((0, A.shape[1]))
+                if linear:
+                    keep = (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ sizes)).any(axis=0)
+                    keep |= pairs[0] == pairs[1]
+                    pairs, H = pairs.compress(keep, 1), H.compress(keep, 1)
+                else:
+                    along = np.concatenate([
+                        np.where(samples.component == k, A, 0.0) for k in range(3)])
+                H *= law.D[tuple(samples.component[pairs])]
+                self.tables.append(self._tables_of(
+                    pattern_of(SECTION, samples.rows, pairs), G, frame, H, law, along, weights,
+                    np.zeros((len(weights), 0)), constant=not self.tables))
                 self.integrals.append(Integral(layer, term, samples, volumes, k == 0))
         self.points_number = sum(one.volumes.shape[1] for one in self.integrals)
-
-    def _add(self, layer, term, constant, rows):
-        """Add the tables of a term; returns its samples and the volumes of its points."""
-        across, ne, nb = self._across, self.t.shape[1], self.nd
-        tind = np.array([0]) if across.uniform else None
-        *nodes, eta, axis = (tuple(np.asarray(x, dtype=float).tolist()) for x in (
-            *map(term.nodes, ("xx", "yy", "xy")), term.section_nodes, term.axis[0]))
-        samples = samples_of(*nodes, eta)
-        if samples not in rows:
-            rows[samples] = _rows(across.mesh, across.element, samples, tind)
-        G, frame = rows[samples]
-        whole, X = len(term.section[0]) == 1, term.quadrature
-        volumes = across.volume(layer, *X, tind, whole)
-        weights = volumes if layer.grade is None else across.volume(layer, *X, tind, whole, "grade")
-        law = law_tables(term.law, self)
-        linear, means = law.kind == LINEAR, len(eta) if term.section_samples is None else tuple(
-            map(tuple, np.asarray(term.section_samples[1]).tolist()))
-        A, pairs, products, sizes = _mixing(samples, tuple(nodes), axis, means, (
-            law.D != 0.0) | (not linear))
-        H, along = weights @ products, np.zeros((0, A.shape[1]))
-        if linear:
-            keep = (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ sizes)).any(axis=0)
-            keep |= pairs[0] == pairs[1]
-            pairs, H = pairs.compress(keep, 1), H.compress(keep, 1)
-        else:
-            along = np.concatenate([np.where(samples.component == k, A, 0.0) for k in range(3)])
-        H *= law.D[tuple(samples.component[pairs])]
-        C = np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if constant is None else constant[:, 2:, 2:]
-        each = [len(x) > 1 for x in (G, frame, H, C, weights)]
-        self.tables.append(StrainTables(
-            pattern_of(SECTION, samples.rows, pairs), nb * self.t[0].astype(np.int64),
-            np.arange(ne)[:, None] * each, *map(np.ascontiguousarray, (G, frame, H, C)), law,
-            along, np.ascontiguousarray(weights), np.zeros((len(weights), 0))))
-        return samples, volumes
 
     @property
     def volume(self) -> float:
@@ -210,16 +202,12 @@ def _mixing(samples, nodes, axis, means, coupled):
 MIDDLE = 1200.0
 
 
+@array_cache(64)
 def _unit(element, points):
     """Derivatives of the axis by xi at each point, the first and the second, (rows, nb), and the
     powers of the length with which they are those by X, (rows,)."""
     slopes = np.stack([element.axis(points, d).T for d in (1, 2)], axis=1)
     return slopes.reshape(2 * len(points), -1), np.tile([-1.0, -2.0], len(points))
-
-
-@lru_cache(64)
-def _unit_at_gauss(element, n):
-    return _unit(element, gauss(n)[0])
 
 
 @lru_cache(64)
@@ -269,26 +257,28 @@ class CableKernel(ElementKernel):
 
     def _table(self, mesh, element, same):
         """Tables of the reference element scaled by the lengths, for one or all elements."""
-        ne, nb, n, w = mesh.nelements, self.nd, self.points_number, self._rule[1]
+        n, w = self.points_number, self._rule[1]
         L = (mesh.lengths[:1] if same else mesh.lengths)[:, None]
-        unit, orders = (_unit_at_gauss(element, n) if self._rule is gauss(n) else
-                        _unit(element, self.points))
+        unit, orders = _unit(element, self.points)
         G = unit * (L**orders)[:, :, None] * element.powers(1.0, L)[:, None]
         EA, ES, EI = self._across.moments(
             self.points, np.zeros(1, int) if same and self._across.constant else None) * (w * L)
         moduli = [EA, EI, -ES] if ES.any() else [EA, EI]
         pattern, order = _samples(n, len(moduli))
         #: Modulus times volume.
-        self.scale = float(EA.sum()) * (ne // len(EA))
+        self.scale = float(EA.sum()) * (mesh.nelements // len(EA))
         H = np.concatenate(moduli, axis=1).take(order, 1)
-        frame = self._frame(mesh, element, n, G)
-        C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
-             self.constant[:, 2:, 2:])
-        each = [len(x) > 1 for x in (G, frame, H, C)] + [False]
-        return StrainTables(
-            pattern, nb * mesh.t[0].astype(np.int64), np.arange(ne)[:, None] * each,
-            *map(np.ascontiguousarray, (G[:, :, 1:], frame, H, C)),
-            NO_LAW, np.zeros((0, 2 * n)), *np.zeros((2, 1, 0)))
+        # r_X and r_XX in the reference configuration
+        if mesh.is_straight:
+            left = mesh.t[0, :1] if mesh.is_uniform else mesh.t[0]
+            frame = np.zeros((len(left), 2 * n, 2))
+            frame[:, ::2] = mesh.p_X[:, left].T[:, None]
+        else:
+            q0 = element.rigid(mesh)
+            q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
+            frame = G @ self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
+        return self._tables_of(pattern, G[:, :, 1:], frame, H, NO_LAW, np.zeros((0, 2 * n)),
+                               *np.zeros((2, 1, 0)))
 
     def _with_fibres(self, mesh, element, same):
         """A table of fibres for each layer."""
@@ -321,17 +311,6 @@ class CableKernel(ElementKernel):
                 C=whole.C[:0] if out else whole.C, law=law, along=along, weights=weights,
                 reach=reach))
         return out
-
-    def _frame(self, mesh, element, n, G):
-        """r_X and r_XX in the reference configuration, (1 or ne, rows, 2)."""
-        if mesh.is_straight:
-            left = mesh.t[0, :1] if mesh.is_uniform else mesh.t[0]
-            frame = np.zeros((len(left), 2 * n, 2))
-            frame[:, ::2] = mesh.p_X[:, left].T[:, None]
-            return frame
-        q0 = element.rigid(mesh)
-        q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
-        return G @ self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
 
     @property
     def weights(self) -> Array:
