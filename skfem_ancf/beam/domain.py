@@ -230,6 +230,8 @@ class Domain(Immutable):
         self.origin = np.asarray(basis.mesh.p.mean(axis=1))
         #: The larger of width and height.
         self.size = float(np.max(np.ptp(basis.mesh.p, axis=1)))
+        #: Typical changes of the DOFs when the domain moves by its size, (N,).
+        self.sizes = np.full(basis.N, self.size)
         # a numbering of the DOFs with a small bandwidth: reverse Cuthill-McKee, or along
         # x or y
         pairs, n = basis.element_dofs[::2] // 2, basis.N // 2
@@ -242,6 +244,8 @@ class Domain(Immutable):
         order = min(orders, key=lambda order: np.max(np.ptp(np.argsort(order)[pairs], axis=0)))
         self._order = (2 * order[:, None] + np.arange(2)).ravel()
         self._rank = np.argsort(self._order)
+        #: Number of subdiagonals.
+        self.bandwidth = int(np.max(np.ptp(self.numbers(basis.element_dofs), axis=0)))
         self._require_derivatives()
 
     @classmethod
@@ -392,11 +396,6 @@ class Domain(Immutable):
 
     # the interface of a beam
 
-    @property
-    def bandwidth(self) -> int:
-        """Number of subdiagonals."""
-        return int(np.max(np.ptp(self.numbers(self.basis.element_dofs), axis=0)))
-
     @cached_property
     def q0_local(self) -> Array:
         """DOFs of the position relative to :attr:`origin`, (N,)."""
@@ -406,11 +405,6 @@ class Domain(Immutable):
     def q0(self) -> Array:
         """DOFs of the position, (N,)."""
         return self.q0_local + self.rigid_motions()[:, :2] @ self.origin
-
-    @property
-    def sizes(self) -> Array:
-        """Typical changes of the DOFs when the domain moves by its size, (N,)."""
-        return np.full(self.N, self.size)
 
     @cached_property
     def scale(self) -> float:

@@ -29,10 +29,6 @@ _handlers: dict[int, Any] = {}
 _pending: list[int] = []
 
 
-def _note(number, frame):
-    _pending.append(number)
-
-
 def _call(handlers):
     waiting = set(_pending)
     _pending.clear()
@@ -50,7 +46,7 @@ def deferred() -> Iterator[None]:
         handler = signal.getsignal(number)
         if callable(handler):
             _handlers[number] = handler
-            signal.signal(number, _note)
+            signal.signal(number, lambda number, frame: _pending.append(number))
     try:
         yield
     finally:

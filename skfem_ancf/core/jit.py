@@ -340,7 +340,10 @@ def entry(function: Any, args: Any) -> Any:
         for k in tuples:
             words = known.get(id(args[k]))
             if words is None or words.of is not args[k]:
-                words = _words(args[k], known)
+                known.pop(id(args[k]), None)
+                known[id(args[k])] = words = Packed(args[k])
+                if len(known) > 16:
+                    del known[next(iter(known))]
             numbers[k] = words.address
             alive += (words,)
         for k in flat:
@@ -353,19 +356,6 @@ def entry(function: Any, args: Any) -> Any:
 def _of_numbers(x):
     """True if a named tuple has numbers only."""
     return all(hint in SCALARS for hint in hints(type(x)))
-
-
-#: Number of tuples whose words are cached.
-LAST = 16
-
-
-def _words(x, known):
-    """A tuple that is not known, packed."""
-    known.pop(id(x), None)
-    known[id(x)] = found = Packed(x)
-    if len(known) > LAST:
-        del known[next(iter(known))]
-    return found
 
 
 def address(function: Any, hints: Any, name: str = "", kept: bool = True,

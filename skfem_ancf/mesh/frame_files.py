@@ -163,8 +163,20 @@ def _ends_first(points, cell):
 
 def _names(mesh, blocks, used, wanted):
     """Lines and nodes by name, and by name a point that is not an end of a line."""
-    sets = {name: parts for name, parts in mesh.cell_sets.items()
-            if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
+    sets = {name: parts for name, parts in mesh.cell_sets.items() if not name.startswith("gmsh:")}
+    # or stored as numbers: Gmsh physical groups, or names in meshio cell data
+    names = {int(number): name for name, (number, _) in mesh.field_data.items()}
+    for key, parts in () if sets else mesh.cell_data.items():
+        known: Any = ()
+        texts = key.split("-")
+        numbers = np.unique(np.concatenate([np.ravel(part) for part in parts]))
+        if key == "gmsh:physical":
+            known = [(int(k), names.get(int(k), str(int(k)))) for k in numbers if k]
+        elif set(wanted) & set(texts) and numbers.dtype.kind in "iu" and (
+                -1 <= numbers[0] and numbers[-1] < len(texts)):
+            known = enumerate(texts)
+        for number, name in known:
+            sets[name] = [np.flatnonzero(np.ravel(part) == number) for part in parts]
     groups, found = {}, dict[str, list[Any]]()
     for name, parts in sets.items():
         refuse(len(parts) > len(mesh.cells), "the cell set {!r} has {} parts, the mesh {} blocks",
@@ -201,24 +213,6 @@ def _entries(name, part, n):
     refuse(len(out) and (out.dtype.kind not in "iu" or out.min() < 0 or out.max() >= n), "the set "
            "{!r} must hold numbers from 0 to {}, got {!r}", name, n - 1, part, error=MeshError)
     return out.astype(np.int64)
-
-
-def _numbered(mesh, wanted):
-    """Cell sets stored as numbers: Gmsh physical groups, or names in meshio cell data."""
-    sets = {}
-    names = {int(number): name for name, (number, _) in mesh.field_data.items()}
-    for key, parts in mesh.cell_data.items():
-        found = np.unique(np.concatenate([np.ravel(part) for part in parts]))
-        if key == "gmsh:physical":
-            known = {int(k): names.get(int(k), str(int(k))) for k in found if k}
-        elif set(wanted) & set(key.split("-")) and found.dtype.kind in "iu" and (
-                -1 <= found[0] and found[-1] < len(key.split("-"))):
-            known = dict(enumerate(key.split("-")))
-        else:
-            continue
-        for number, name in known.items():
-            sets[name] = [np.flatnonzero(np.ravel(part) == number) for part in parts]
-    return sets
 
 
 def _polynomial(points, s):

@@ -21,9 +21,10 @@ from .mapping import heights_of
 # the mesh of the lines of a frame: several chains of elements
 
 
-def chain_of(s: Array) -> Array:
-    """Chain number of parameters (n,), which run from 2 k to 2 k + 1 on chain k."""
-    return np.floor(0.5 * s).astype(int)
+def chains_of(s: Array) -> tuple[Array, Array]:
+    """Chain numbers of parameters (n,), from 2 k to 2 k + 1 on chain k, and those on the chains."""
+    chain = np.floor(0.5 * s).astype(int)
+    return chain, s - 2.0 * chain
 
 
 class MeshLines(MeshBeam):
@@ -34,8 +35,7 @@ class MeshLines(MeshBeam):
     @property
     def parameters(self) -> Array:
         """Parameter of each node on its local chain, from 0 to 1, shape (nvertices,)."""
-        s = cast("Array", self.s)
-        return s - 2.0 * chain_of(s)
+        return chains_of(cast("Array", self.s))[1]
 
     def _heights_of(self, height):
         return heights_of_chains(height, self.s, self.t)
@@ -52,8 +52,7 @@ class Heights:
         return ", ".join(map(shown, self.given))
 
     def __call__(self, s: Array) -> Array:
-        chain, out = chain_of(s), np.empty(len(s))
-        local = s - 2.0 * chain
+        (chain, local), out = chains_of(s), np.empty(len(s))
         if len(self.given) == 1:
             return _values(self.given[0], local)
         for k in np.unique(chain).tolist():
@@ -69,8 +68,7 @@ def _values(height, s):
 def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
     """As :func:`~.mapping.heights_of`, for a number, a function, or a list for the chains."""
-    chain = chain_of(s)
-    local = s - 2.0 * chain
+    chain, local = chains_of(s)
     if not isinstance(height, list):
         largest, heights, _ = heights_of(height, local, t)
         return largest, heights, None if heights is None else Heights([height])
@@ -95,9 +93,9 @@ class Axes:
         self.arcs, self.start, self.chord = dict(arcs), start, chord
 
     def _parts(self, s):
-        chain = chain_of(s)
-        return chain, s - 2 * chain, [(arc, chain == k) for k, arc in self.arcs.items()
-                                      if np.any(chain == k)]
+        chain, local = chains_of(s)
+        return chain, local, [(arc, chain == k) for k, arc in self.arcs.items()
+                              if np.any(chain == k)]
 
     def nodes(self, s: Array) -> tuple[Array, Array]:
         chain, s, parts = self._parts(s)

@@ -102,13 +102,21 @@ class Elements:
         self.G, self.own, self._even = G, len(G) > 1, len(R) == 1 or len(G) > 1
         self.R, self.D = R.T[:, None].copy(), D.T[:, None].copy()
         self.x = self._last(t.frame, OF_FRAME)
-        self.start, self.rest = t.start, self.measured(self.x)
+        self.rest = self.measured(self.x)
         self._second, self._sample, self._row, self._direction = t.pattern.ends
         self._last_rows: tuple[Any, ...] = ()  # displacements, with the results of :meth:`at`
         self._at_band: dict[int, Array] = {}  # flat positions of the lower halves in a band
         # relative DOFs (2 m, ne)
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]
+        # the slice of DOFs, and where in it the element forces of :meth:`add` go
+        self._span = slice(int(t.start.min()), int(t.start.max()) + 2 * self.m + 2)
+        self._ends = np.concatenate([self._dofs, self._left]).ravel() - self._span.start
+        #: Weighted moduli between samples, (nq, ne or 1).
+        self.moduli = self._last(t.H, OF_H)
+        #: The constant stiffness (1 or ne, 2 m, 2 m), or None.
+        self.C: Array | None = (None if not len(t.C) else t.C if len(t.C) == 1 else
+                                t.C[t.at[:, OF_C]])
 
     def _last(self, x, column):
         """A table with the elements as last axis, of length 1 if all are equal."""
@@ -118,17 +126,6 @@ class Elements:
     @cached_property
     def _G_ends(self):
         return np.ascontiguousarray(self.G.transpose(0, 2, 1).take(self._row, axis=2))
-
-    @cached_property
-    def moduli(self) -> Array:
-        """Weighted moduli between samples, (nq, ne or 1)."""
-        return self._last(self.t.H, OF_H)
-
-    @cached_property
-    def C(self) -> Array | None:
-        """The constant stiffness (1 or ne, 2 m, 2 m), or None."""
-        C = self.t.C
-        return None if not len(C) else C if len(C) == 1 else C[self.t.at[:, OF_C]]
 
     # kinematics
 
@@ -301,15 +298,6 @@ class Elements:
         q = self.m // 2
         at, F = self._ends, np.concatenate([F, -F[q:q + 1]]).ravel()
         f[self._span] += np.bincount(at, F, self._span.stop - self._span.start)
-
-    @cached_property
-    def _span(self):
-        """The slice of DOFs."""
-        return slice(int(self.t.start.min()), int(self.t.start.max()) + 2 * self.m + 2)
-
-    @cached_property
-    def _ends(self):
-        return np.concatenate([self._dofs, self._left]).ravel() - self._span.start
 
     # tangent
 

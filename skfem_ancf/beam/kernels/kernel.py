@@ -64,11 +64,6 @@ class ElementKernel:
         return u if u.dtype.kind == "c" else np.ascontiguousarray(u, dtype=float)
 
     @property
-    def shared(self) -> bool:
-        """True if all elements have the same table."""
-        return len(self.tables[0].G) == 1
-
-    @property
     def linear(self) -> bool:
         """True if all moduli are constant."""
         return all(t.law.kind == LINEAR for t in self.tables)
@@ -147,7 +142,7 @@ class ElementKernel:
 
     def eigenstrain_tangents(self, given: list[Array], u: Array) -> Array:
         """Change of the :meth:`tangents` by eigenstrains, see :meth:`eigenstrain_forces`."""
-        return self._tangents(run_eigen_tangent, u, self._apart, given)
+        return self._tangents(run_eigen_tangent, u, given)
 
     def _forces(self, u, v=None, given=None, eigen=False):
         """Element forces at u, or means from u to v, of the strain, or of given stresses."""
@@ -197,18 +192,24 @@ class ElementKernel:
 
     def tangents(self, u: Array) -> Array:
         """Element tangents (ne, 2 nb, 2 nb)."""
-        return self._tangents(_run_tangent, u, self._apart)
+        return self._tangents(lambda e, u, given, flat, ld: run_tangent(
+            e, u, given, given, given, flat, ld), u)
 
     def geometric(self, u: Array, stress: Array) -> Array:
         """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m)."""
         # The stresses of all :attr:`tables` are side by side; further columns are ignored.
         given = np.split(stress, np.cumsum([t.pattern.ns for t in self.tables]), axis=1)
-        return self._tangents(_run_geometric, u, self._apart, given)
 
-    def _tangents(self, run, u, elements, given=None):
+        def run(e, u, given, flat, ld):
+            _, _, one, Y = e.at(u)
+            e.add_to_band(e.tangent(one, Y, given.reshape(e.ne, e.ns).T, None), flat, ld)
+
+        return self._tangents(run, u, given)
+
+    def _tangents(self, run, u, given=None):
         u, n = self.gather(self._checked(u)).ravel(), 2 * self.nd
         flat = np.zeros((self.t.shape[1], n, n + 1))
-        for k, e in enumerate(elements):
+        for k, e in enumerate(self._apart):
             run(e, u, u[:0] if given is None else given[k].ravel(), flat.reshape(-1), n + 1)
         i, j = np.tril_indices(n)
         out = np.empty((len(flat), n, n))
@@ -239,15 +240,6 @@ class ElementKernel:
     def inverted(self, u: Array) -> bool:
         """True if the body is turned inside out somewhere."""
         return False
-
-
-def _run_tangent(e, u, given, flat, ld):
-    run_tangent(e, u, given, given, u[:0], flat, ld)
-
-
-def _run_geometric(e, u, given, flat, ld):
-    _, _, one, Y = e.at(u)
-    e.add_to_band(e.tangent(one, Y, given.reshape(e.ne, e.ns).T, None), flat, ld)
 
 
 def strains(e: Elements, u: Array) -> Array:
@@ -309,7 +301,7 @@ def remembering(elements: Sequence[Elements], past: Past) -> list[Elements]:
 #: Relative difference of strains that is round-off.
 SAME = 1e-12
 #: What copies of elements share.
-CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_reach_of_pairs", "_ends",
+CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_reach_of_pairs",
             "_products", "_signs")
 
 

@@ -267,26 +267,25 @@ def conserve(law, middle, change, S):
 
 def law_tables(law: Any, owner: Any) -> LawTables:
     """The LawTables of a law; a law in Python is registered while its ``owner`` lives."""
-    one = np.ones(3)
+    base, scale, constants = law, np.ones(3), np.zeros(3)
     if isinstance(law, AtRest):
-        handle = next(_handles)
-        _LAWS[handle] = law.material
-        weakref.finalize(owner, _LAWS.pop, handle, None)
-        constants = np.zeros(3)
-        if law.material.point is not None or law.material.fibre is not None:
-            constants = law.material.constants
-        return LawTables(HISTORY, handle, 0, law.D.copy(), constants, law.scale)
-    if isinstance(law, LinearLaw):
-        return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
-    base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
-    handle, kind, constants = next(_handles), CUSTOM, np.zeros(3)
-    if isinstance(base, PointwiseMaterial) and base.is_pointwise:
-        kind, constants = POINTWISE, np.array(base.constants, dtype=float)
+        kind, base, scale, D = HISTORY, law.material, law.scale, law.D
+        if base.point is not None or base.fibre is not None:
+            constants = base.constants
+    elif isinstance(law, LinearLaw):
+        return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), constants, scale)
+    else:
+        if type(law) is ShearCorrected:
+            base, scale = law.base, law.scale
+        kind = CUSTOM
+        if isinstance(base, PointwiseMaterial) and base.is_pointwise:
+            kind, constants = POINTWISE, base.constants
+        with np.errstate(all="ignore"):
+            D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
+    handle = next(_handles)
     _LAWS[handle] = base
     weakref.finalize(owner, _LAWS.pop, handle, None)
-    with np.errstate(all="ignore"):
-        D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
-    return LawTables(kind, handle, 0, np.array(D), constants, np.array(scale, dtype=float))
+    return LawTables(kind, handle, 0, *(np.array(x, dtype=float) for x in (D, constants, scale)))
 
 
 #: For cables, which have moduli only.
