@@ -164,27 +164,13 @@ class FrameGraph:
         refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line: "
                    "remove it, or join it to another point", self.points, error=MeshError)
         self._merge(tol)
-        self._require_lines()
-        self.beams = tuple(self.groups) if beams is None else tuple(beams)
-        taken = np.full(m, -1)  # the number of the group of each line
-        for name in self.beams:
-            some = self.groups[name]
-            refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: groups= names "
-                       "the sets of a mesh that are beams", some,
-                       np.array(self.beams)[taken[some]], name)
-            taken[some] = self.beams.index(name)
-            refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
-                   "shorter than tol = {:.3g}", name, self.tol, error=MeshError)
-
-    def _require_lines(self):
         key = np.sort(self.lines[:, self.distinct], axis=0)
         _, first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)
         first = first[np.ravel(which)]
-        for i, j in zip(self.distinct[first], self.distinct):
-            if i != j and not {int(i), int(j)} & set(self.curves):
-                raise MeshError(f"lines {i} and {j} are the same: both join the points "
-                                f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
-                                "them a curve")
+        i, j = pair = np.array([self.distinct[first], self.distinct])
+        refuse_any((i != j) & ~np.isin(pair, list(self.curves)).any(axis=0), "lines {} and {} are "
+                   "the same: both join the points {}; remove one, or give one of them a curve",
+                   i, j, np.sort(self.lines[:, j], axis=0), error=MeshError)
         # warn of nodes on a straight line between its ends: lines are joined at their
         # ends only
         some = np.setdiff1d(self.distinct, list(self.curves))
@@ -201,9 +187,19 @@ class FrameGraph:
         if np.any(on):
             node, line = node[on][0], some[k[on][0]]
             more = f", and {np.sum(on) - 1} other(s) likewise" if np.sum(on) > 1 else ""
-            warn("the node {} at ({:.9g}, {:.9g}) is on line {} between its ends{}, and not joined "
-                 "to it: divide the line there if it should be".format(
-                     node, *self.points[:, node], line, more), ModelWarning)
+            at = "({:.9g}, {:.9g})".format(*self.points[:, node])
+            warn(f"the node {node} at {at} is on line {line} between its ends{more}, and not "
+                 "joined to it: divide the line there if it should be", ModelWarning)
+        self.beams = tuple(self.groups) if beams is None else tuple(beams)
+        taken = np.full(m, -1)  # the number of the group of each line
+        for name in self.beams:
+            some = self.groups[name]
+            refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: groups= names "
+                       "the sets of a mesh that are beams", some,
+                       np.array(self.beams)[taken[some]], name)
+            taken[some] = self.beams.index(name)
+            refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
+                   "shorter than tol = {:.3g}", name, self.tol, error=MeshError)
 
     def _merge(self, tol):
         n, places = self.points.shape[1], self.points
