@@ -5,9 +5,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csr_matrix
-from skfem.assembly import Basis, FacetBasis
-from skfem.element import ElementVector
+from skfem import Basis, ElementVector, FacetBasis
 
 from ..core import (Array, ArrayLike, Immutable, Place, cached_property, read_only, refuse,
                     require_finite, require_flag, require_integer, require_kind, require_label,
@@ -368,7 +366,7 @@ class Beam(Immutable):
         load = self.masses.weights(require_finite("g", g, (2,)))
         return self.kernel.scatter(load + np.zeros((self.mesh.nelements, 1, 1)))
 
-    def mass(self) -> csr_matrix:
+    def mass(self) -> sparse.csr_matrix:
         """The constant mass matrix, sparse, shape (N, N)."""
         entries = kinematics.entries_of(self.basis.element_dofs.T)
         M = sparse.coo_matrix((self.mass_elements().ravel(), entries),

@@ -2,21 +2,18 @@
 bodies for all local functions at once."""
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import reverse_cuthill_mckee
-from skfem import Basis, BilinearForm, ElementVector, LinearForm
-from skfem.assembly import Functional
-from skfem.assembly.dofs import DofsView
+from skfem import Basis, BilinearForm, DofsView, ElementVector, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.helpers import dot
 
-from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, explained,
-                    gauss, read_only, refuse, refuse_any, require_finite, require_label,
-                    require_like, require_option, require_positive, require_slope, shown)
+from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError,
+                    cached_property, explained, gauss, read_only, refuse, refuse_any,
+                    require_finite, require_label, require_like, require_option, require_positive,
+                    require_slope, shown)
 from ..materials import HistoryMaterial, Material
 from ..mesh.places import as_point, is_point
 from ..sections.section import evaluated
@@ -239,8 +236,8 @@ class Domain(Immutable):
         i, j = np.repeat(pairs, k, axis=0).ravel(), np.tile(pairs, (k, 1)).ravel()
         graph = sparse.csr_matrix((np.ones(len(i)), (i, j)), shape=(n, n))
         x, y = basis.doflocs[:, ::2]
-        orders = [reverse_cuthill_mckee(graph, symmetric_mode=True), np.lexsort((y, x)),
-                  np.lexsort((x, y))]
+        orders = [sparse.csgraph.reverse_cuthill_mckee(graph, symmetric_mode=True),
+                  np.lexsort((y, x)), np.lexsort((x, y))]
         order = min(orders, key=lambda order: np.max(np.ptp(np.argsort(order)[pairs], axis=0)))
         self._order = (2 * order[:, None] + np.arange(2)).ravel()
         self._rank = np.argsort(self._order)

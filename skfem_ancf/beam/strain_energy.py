@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.band import add_multiple, clear
-from ..core import I1, I2, Array, cached_property, primitive, source
+from ..core import I1, I2, Array, add_multiple, cached_property, clear, primitive, source
 from .beam import Beam
 from .kernels.elements import (Elements, run_accept, run_eigen_force, run_eigen_tangent, run_force,
                                run_linearised, run_put, run_tangent, run_unsymmetric)

@@ -17,7 +17,7 @@ from .immutable import (Immutable, array_cache, cached_property, is_builtin, pic
 from .quadrature import gauss, gauss_lobatto, hermite_basis, lagrange, product_rule, tensor
 from .linear import angle_of, first_order, largest, step, stress_of, unwrapped
 from .archive import output_file
-from .band import Band, BandMatrix, Inertia
+from .band import Band, BandMatrix, Inertia, add_multiple, clear
 from .callbacks import (call_custom, call_loaded, call_solver, custom_distance, deferred, handle_of,
                         owner, raise_kept)
 from .progress import announced_bar, progress_bar

@@ -8,14 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse.linalg import splu
 
 from .callbacks import call_solver, handle_of
 from .source import F1, F2, I1, apart, indices, primitive, shaped, source
-from .types import Array
+from .types import Array, ArrayLike
 
 #: Zeros after each column of a lower half, for vectorised loops over four columns.
 SPARE = 6

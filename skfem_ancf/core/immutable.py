@@ -4,7 +4,6 @@ import functools
 import inspect
 import sys
 from collections.abc import Callable, Sequence
-from functools import lru_cache, wraps
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -210,12 +209,12 @@ class _ArrayKey(NamedTuple):
 def array_cache(maxsize: int) -> Callable[[Function], Function]:
     """``functools.lru_cache`` for functions of arrays; results must be read-only."""
     def decorate(function: Function) -> Any:
-        @lru_cache(maxsize)
+        @functools.lru_cache(maxsize)
         def of_keys(*keys: Any) -> Any:
             return function(*(np.ndarray(k.shape, k.dtype, k.values).copy()
                               if isinstance(k, _ArrayKey) else k for k in keys))
 
-        @wraps(function)
+        @functools.wraps(function)
         def cached(*args: Any) -> Any:
             return of_keys(*(_ArrayKey(a.shape, a.dtype.str, a.tobytes())
                              if isinstance(a, np.ndarray) else a for a in args))

@@ -5,11 +5,10 @@ from math import comb, perm
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from .errors import InputError, refuse, require_finite, require_integer, shown
 from .immutable import read_only
-from .types import Array, Rule
+from .types import Array, ArrayLike, Rule
 
 #: Largest number of points.
 MAX_POINTS = 1000

@@ -6,8 +6,6 @@ from typing import Any, cast
 
 import numpy as np
 import scipy
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..core import (Array, InputError, MeshError, ModelWarning, ask_field, refuse, refuse_any,
                     require_finite, require_integer, require_label, require_moderate,
@@ -215,8 +213,8 @@ class FrameGraph:
         refuse_any(apart[~one] <= NEAR * self.size, "the points {} and {} are both at {:.9g}: give "
                    "tol= to make them one", *pairs[~one].T, places[:, pairs[~one, 0]],
                    error=MeshError)
-        joined = sparse.coo_array((np.ones(int(one.sum())), pairs[one].T), (n, n))
-        _, label = connected_components(joined, directed=False)
+        joined = scipy.sparse.coo_array((np.ones(int(one.sum())), pairs[one].T), (n, n))
+        _, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
         _, first = np.unique(label, return_index=True)
         self.same = first[label]
         self.points, self.lines = places[:, self.same], self.same[self.given]

@@ -7,10 +7,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy import ndarray
-from skfem.element import Element
+from skfem import Element, MeshQuad
 from skfem.generic_utils import OrientedBoundary
-from skfem.mesh import MeshQuad
 
 from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, StrPath, archive,
                     cached_property, is_builtin, picklable, refuse, refuse_any, require_finite,
@@ -88,14 +86,14 @@ class MeshBeam(NumberedMesh):
 
     elem: type[Element] = ElementBeamP1
     height: float = None  # type: ignore[assignment]
-    p_X: ndarray = None  # type: ignore[assignment]
-    p_Y: ndarray = None  # type: ignore[assignment]
-    lengths: ndarray = None  # type: ignore[assignment]
-    s: ndarray | None = None
+    p_X: np.ndarray = None  # type: ignore[assignment]
+    p_Y: np.ndarray = None  # type: ignore[assignment]
+    lengths: np.ndarray = None  # type: ignore[assignment]
+    s: np.ndarray | None = None
     curve: Curve | None = None
-    p_XY: ndarray | None = None
+    p_XY: np.ndarray | None = None
     sections: str = "linear"
-    heights: ndarray | None = None
+    heights: np.ndarray | None = None
     taper: Callable[[Array], ArrayLike] | None = None
     #: Name of the class in files.
     kind = "beam"

@@ -6,9 +6,8 @@ from types import MappingProxyType
 from typing import Any, NoReturn
 
 import numpy as np
-from skfem.element import ElementH1
+from skfem import ElementH1, Mesh2D
 from skfem.generic_utils import OrientedBoundary
-from skfem.mesh import Mesh2D
 from skfem.refdom import RefLine, RefQuad, Refdom
 
 from ..core import (Array, ArrayLike, Immutable, MeshError, NearMisses, read_only, refuse,

@@ -4,8 +4,7 @@ ns,), or of size 0. Other arrays are as in :mod:`.blocks`."""
 
 import numpy as np
 
-from ...core.band import add_multiple
-from ...core import F1, F2, apart, room, source
+from ...core import F1, F2, add_multiple, apart, room, source
 from .blocks import (AT_START, add, add_forces_of, add_geometric, add_material, add_matrices,
                      at_points, between_samples, block, changes, components, directions, displaced,
                      evaluate_increment, from_points, gather, law_stresses, moduli, of_block, place,
