@@ -227,18 +227,18 @@ class Elements:
         # it is the difference that the shift makes.
         if self.t.law.kind == LINEAR:
             return self.linear_stress(strain)
-        E, C = self.at_points(strain), None if change is None else self.at_points(change)
-        S = self._law_stress(E, C)
-        if shift is not None:
-            S = self._law_stress(E + shift, C) - S
-        return self._weighted(S)
+        return self._weighted(self.of_law(3, self.at_points(
+            strain), None if change is None else self.at_points(change), shift))
 
-    def _law_stress(self, E, C):
-        S = np.empty_like(E)
-        law_evaluate(self.t.law, E, S)
-        if C is not None:
-            conserve(self.t.law, E, C, S)
-        return S
+    def of_law(self, n: int, E: Array, change: Array | None = None, shift: Array | None = None
+               ) -> Array:
+        """What a nonlinear law has at strains E (3, points, ne): 1, the energy, 3 stresses, 9
+        moduli, or 12, both; see :meth:`stress`."""
+        found = np.empty((n, *E.shape[1:]), E.dtype)
+        law_evaluate(self.t.law, E, found)
+        if change is not None:
+            conserve(self.t.law, E, change, found)
+        return found if shift is None else self.of_law(n, E + shift, change) - found
 
     @cached_property
     def _reach_of_pairs(self):
@@ -258,22 +258,14 @@ class Elements:
         """Weighted stresses (ns, ne), and moduli (nq, ne) between samples."""
         if self.t.law.kind == LINEAR:
             return self.linear_stress(strain), self.moduli
-        both = np.empty((12, len(self.t.along) // 3, self.ne))
-        law_evaluate(self.t.law, self.at_points(strain), both)
+        both = self.of_law(12, self.at_points(strain))
         return self._weighted(both[:3]), self._moduli_of_samples(both[3:])
 
     def moduli_at(self, strain: Array, shift: Array | None = None) -> Array:
         """Moduli (nq, ne) between samples, or their change by a shift as in :meth:`stress`."""
         if self.t.law.kind == LINEAR:
             return self.moduli
-        E = self.at_points(strain)
-        D = np.empty((9, *E.shape[1:]))
-        law_evaluate(self.t.law, E, D)
-        if shift is not None:
-            still, D = D, np.empty_like(D)
-            law_evaluate(self.t.law, E + shift, D)
-            D -= still
-        return self._moduli_of_samples(D)
+        return self._moduli_of_samples(self.of_law(9, self.at_points(strain), shift=shift))
 
     # force
 

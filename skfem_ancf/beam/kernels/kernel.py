@@ -10,8 +10,7 @@ from ...core import Array, cached_property, refuse
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements, run_eigen_force, run_eigen_tangent, run_force, run_tangent
-from .tables import (CABLE, HISTORY, LINEAR, StrainTables, law_evaluate, material_of, repeated,
-                     separated)
+from .tables import CABLE, HISTORY, LINEAR, StrainTables, material_of, repeated, separated
 
 #: Approximate number of elements whose energies are evaluated together.
 TOGETHER = 4096
@@ -255,9 +254,7 @@ def energy_at(e: Elements, E: Array) -> Array:
     """Energy (ne,) of strains (3, points, ne) at the integration points."""
     if isinstance(e, ElementsWithHistory):
         return np.sum(e.weights * e.energy(E), axis=0)
-    W = np.empty((1, *E.shape[1:]), E.dtype)
-    law_evaluate(e.t.law, E, W)
-    return np.sum(e.weights * W[0], axis=0)
+    return np.sum(e.weights * e.of_law(1, E)[0], axis=0)
 
 
 def stresses_of(e: Elements, strain: Array) -> Array:
