@@ -13,7 +13,7 @@ from skfem.helpers import dot
 from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError,
                     cached_property, explained, gauss, read_only, refuse, refuse_any,
                     require_finite, require_label, require_like, require_option, require_positive,
-                    require_slope, shown)
+                    require_slope)
 from ..materials import HistoryMaterial, Material
 from ..mesh.places import as_point, is_point
 from ..sections.section import evaluated
@@ -213,11 +213,10 @@ class Domain(Immutable):
                "whole mesh: for a part of it use mesh.restrict(elements)")
         for what, form, kind in (("residual", residual, LinearForm),
                                  ("tangent", tangent, BilinearForm), ("mass", mass, BilinearForm)):
-            if not (isinstance(form, kind) or (form is None and what == "mass")):
-                hint = ("; of a linear problem with the BilinearForm a it is LinearForm(lambda v, "
-                        "w: a.form(w['u'], v, w))" if isinstance(form, BilinearForm) else "")
-                raise InputError(f"{what} of a Domain is a {kind.__name__} of scikit-fem, got "
-                                 f"{shown(form)}{hint}")
+            refuse(not (isinstance(form, kind) or (form is None and what == "mass")),
+                   "{} of a Domain is a {} of scikit-fem, got {!r}{}", what, kind.__name__, form,
+                   "; of a linear problem with the BilinearForm a it is LinearForm(lambda v, w: "
+                   "a.form(w['u'], v, w))" * isinstance(form, BilinearForm))
         self.basis, self.residual, self.tangent, self.mass = basis, residual, tangent, mass
         self.name = require_label("name", name)
         self.N: int = basis.N

@@ -33,9 +33,8 @@ class Layout:
 
     def __init__(self, *members: Beam | RigidBody | Domain) -> None:
         for one in members:
-            if not isinstance(one, (Beam, RigidBody, Domain)):
-                raise InputError("a scene is made of Beams, RigidBodies and Domains, got "
-                                 f"{shown(one)}")
+            refuse(not isinstance(one, (Beam, RigidBody, Domain)), "a scene is made of Beams, "
+                   "RigidBodies and Domains, got {!r}", one)
         refuse(not members, "a scene needs at least a Beam, a RigidBody or a Domain, got none")
         names = [one.name for one in members if one.name is not None]
         refuse(len(set(names)) < len(names) or len(set(map(id, members))) < len(members), "the "

@@ -147,22 +147,17 @@ def verified(place: Path, name: str) -> Iterator[None]:
     """Around work that uses the cached files of a function: removes those that have been damaged. A
     checksum lies beside each file, since Numba runs what it finds in it."""
     def files():
-        return place.glob(f"*.{name}-*.nb[ci]")
+        for path in place.glob(f"*.{name}-*.nb[ci]"):
+            yield (path, path.with_suffix(f"{path.suffix}-sum"),
+                   b"%08x" % zlib.crc32(path.read_bytes()))
 
-    def noted(path):
-        return path.with_suffix(f"{path.suffix}-sum")
-
-    for path in files():
-        if not noted(path).exists() or noted(path).read_bytes() != _sum(path):
+    for path, noted, checksum in files():
+        if not noted.exists() or noted.read_bytes() != checksum:
             logger.info("%s is damaged, and compiled again", path)
             path.unlink()
     yield
-    for path in files():
-        noted(path).write_bytes(_sum(path))
-
-
-def _sum(path):
-    return b"%08x" % zlib.crc32(path.read_bytes())
+    for _, noted, checksum in files():
+        noted.write_bytes(checksum)
 
 
 @contextmanager

@@ -149,23 +149,21 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
     along, mixing = map(_sparse, (
         t.along, t.along[:0] if t.law.kind == LINEAR else to_moduli(
             t.pattern, t.weights.shape[1], t.along)))
+    rest = _NOTHING
+    if not section:
+        z = frame.view(complex)[..., 0].T
+        rest = _blocks(np.array([np.abs(z[::2]), (z[1::2] / z[::2]).imag]).T)
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
         compiled_pattern(pattern), pattern.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _scales(reach),
-        _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled,
+        _blocks(frame), rest, _blocks(H), P, Q, K, Z, coupled,
         t.law, along, _blocks(each(t.weights, OF_WEIGHTS)), mixing, _NO_MEMORY)
 
 
 def _sparse(A):
     A = coo_array(A)
     return Sparse(*(x.astype(np.int64) for x in A.coords), A.data)
-
-
-def _rest(x):
-    """|r_X| and the curvature of rows (k, 2 points, 2) of a cable."""
-    z = x.view(complex)[..., 0].T
-    return _blocks(np.array([np.abs(z[::2]), (z[1::2] / z[::2]).imag]).T)
 
 
 def _blocks(x):
