@@ -128,12 +128,6 @@ def grade_at(function: Any, x: Array, what: str) -> Any:
     return evaluated(what, function, *x)
 
 
-#: Gauss points for the work of the residual from the reference configuration, and in a time step.
-WORK, STEP = 6, 3
-#: Tolerance of points outside of the reference cell, and iterations for local coordinates.
-OUTSIDE, ITERATIONS = 1e-6, 12
-
-
 class Domain(Immutable):
     """A two-dimensional body given by a basis and forms of scikit-fem, a member of a Scene.
 
@@ -363,7 +357,7 @@ class Domain(Immutable):
         if self._solid is not None:
             return float(self._ask("energy", self._solid.energy.assemble, self.basis,
                                    **self._with(u)))
-        return float(sum(w * (self.force(s * u) @ u) for s, w in zip(*gauss(WORK))))
+        return float(sum(w * (self.force(s * u) @ u) for s, w in zip(*gauss(6))))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """Mean of the internal force on a straight path between two displacements.
@@ -374,7 +368,7 @@ class Domain(Immutable):
             Displacements at the start and the end, shape (N,).
         """
         d = u1 - u0
-        return sum((w * self.force(u0 + s * d) for s, w in zip(*gauss(STEP))), np.zeros(self.N))
+        return sum((w * self.force(u0 + s * d) for s, w in zip(*gauss(3))), np.zeros(self.N))
 
     def inverted(self, u: Array) -> bool:
         """True if a cell is turned inside out at a displacement (N,)."""
@@ -539,7 +533,7 @@ class Domain(Immutable):
             # not mapping.invF, which fails for all cells if one does not converge
             X = np.full((2, len(near), 1), 1.0 / 3.0)
             with np.errstate(all="ignore"):
-                for _ in range(ITERATIONS):
+                for _ in range(12):
                     rest = point[:, None] - mapping.F(X, tind=near)[..., 0]
                     D = np.moveaxis(mapping.DF(X, tind=near)[..., 0], -1, 0)
                     X = X + np.linalg.solve(D, rest.T[..., None]).transpose(1, 0, 2)
@@ -547,7 +541,7 @@ class Domain(Immutable):
             out = np.maximum(-X.min(axis=0), (X.sum(axis=0) if mesh.t.shape[0] == 3 else
                                               X.max(axis=0)) - 1.0)
             best = int(np.argmin(np.where(np.isfinite(out), out, np.inf)))
-            if out[best] <= OUTSIDE:
+            if out[best] <= 1e-6:
                 cells[k], local[:, k] = near[best], X[:, best]
         return cells, local
 

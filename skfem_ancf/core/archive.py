@@ -14,9 +14,6 @@ import numpy as np
 from .errors import FileError, retold
 from .types import Array, ArrayLike, StrPath
 
-#: NumPy kinds of arrays in files.
-KINDS = "biufcUS"
-
 
 class Unreadable(ValueError):
     """A file is damaged, or was not written by :func:`write`."""
@@ -38,7 +35,7 @@ def read(path: Path) -> dict[str, Array]:
         except Exception as error:  # any content
             raise Unreadable(f"{type(error).__name__}: {error}") from None
     for name, array in arrays.items():
-        if array.dtype.kind not in KINDS:
+        if array.dtype.kind not in "biufcUS":
             raise Unreadable(f"the array {name!r} has the type {array.dtype}, neither numbers nor "
                              "texts")
     return arrays

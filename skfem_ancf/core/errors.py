@@ -387,10 +387,6 @@ def require_unmasked(name: str, value: Any) -> None:
            "replace them with numpy.ma.filled", name)
 
 
-#: Largest relative error of a derivative, compared with the difference quotient.
-SLOPE = 0.01
-
-
 def along(function: Callable[[float], Any]) -> list[Array]:
     """Values of a function at -1, 0 and 1, for :func:`require_slope`."""
     return [np.asarray(function(s)) for s in (-1.0, 0.0, 1.0)]
@@ -407,7 +403,7 @@ def require_slope(what: str, of: str, values: Sequence[Any] | Callable[[float], 
     off = np.abs(change - slope)
     if noise is None:
         noise = 1e-12 * np.max(np.abs(values[1]), initial=0.0)
-    if not np.max(off, initial=0.0) <= SLOPE * np.max(np.abs([change, slope])) + noise:  # or NaN
+    if not np.max(off, initial=0.0) <= 0.01 * np.max(np.abs([change, slope])) + noise:  # or NaN
         k = np.argmax(off)
         raise InputError(f"{what} is not the derivative of {of}: over a small step it gives "
                          f"{slope[k]:.6g}, but the change is {change[k]:.6g}{else_}")

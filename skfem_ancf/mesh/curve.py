@@ -65,8 +65,6 @@ logger = logging.getLogger(__name__)
 STENCIL = np.arange(-3, 4)
 #: Relative coordinates in an element for curvatures, and beside a node for kinks.
 FINE, ASIDE = np.arange(32) / 32.0, np.array([-1e-3, 1e-3, -2.5e-4, 2.5e-4])
-#: Relative parameters at which the complex step is compared with differences.
-TRIED = np.linspace(0.0137, 0.991, 24)
 #: Smallest angle of a kink that is refused; fine polygons have smaller ones.
 KINK = 1e-2
 
@@ -178,7 +176,7 @@ def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[
     """Derivative of ``r`` on [s0, s1] by the complex step, or else by sixth-order differences."""
     differences, complex_step = partial(_differences, r, s0, s1), partial(_complex_step, r)
     try:
-        probe = s0 + (s1 - s0) * TRIED
+        probe = s0 + (s1 - s0) * np.linspace(0.0137, 0.991, 24)
         with warnings_as_errors():  # among them: the imaginary part is discarded
             exact, near = complex_step(probe), differences(probe)
         size = np.abs(near)

@@ -12,9 +12,6 @@ from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements, run_eigen_force, run_eigen_tangent, run_force, run_tangent
 from .tables import CABLE, HISTORY, LINEAR, StrainTables, material_of, repeated, separated
 
-#: Approximate number of elements whose energies are evaluated together.
-TOGETHER = 4096
-
 
 class ElementKernel:
     """Base class of the kernels of one beam. Displacements u are (N,), element forces (ne, nb, 2),
@@ -78,7 +75,7 @@ class ElementKernel:
         """Strain energy of a displacement (N,), or of several, (k, N): shape () or (k,)."""
         if u.ndim == 1:
             return np.sum(self.energies(u))
-        n = max(1, TOGETHER // self.t.shape[1])
+        n = max(1, 4096 // self.t.shape[1])  # of about so many elements together
         return np.concatenate([np.sum(self._energies(u[k:k + n]), axis=1)
                                for k in range(0, len(u), n)])
 

@@ -23,9 +23,6 @@ from ...sections import Across, Layer
 from .kernel import ElementKernel, fibres, strains
 from .tables import CABLE, LINEAR, NO_LAW, OF_WEIGHTS, SECTION, law_tables, pattern_of
 
-#: Relative size of a modulus between samples that is round-off.
-ORTHOGONAL = 1e-14
-
 
 class Integral(NamedTuple):
     """One term of the strain energy of one layer."""
@@ -69,8 +66,8 @@ class SectionKernel(ElementKernel):
                 A, pairs, products, sizes = _mixing(samples, tuple(nodes), axis, means, (
                     law.D != 0.0) | (not linear))
                 H, along = weights @ products, np.zeros((0, A.shape[1]))
-                if linear:
-                    keep = (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ sizes)).any(axis=0)
+                if linear:  # others are round-off
+                    keep = (np.abs(H) > 1e-14 * (np.abs(weights) @ sizes)).any(axis=0)
                     keep |= pairs[0] == pairs[1]
                     pairs, H = pairs.compress(keep, 1), H.compress(keep, 1)
                 else:
@@ -197,11 +194,6 @@ def _mixing(samples, nodes, axis, means, coupled):
     return A, pairs, products, np.abs(products)
 
 
-#: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
-#: beam; the third point has a quarter of it.
-MIDDLE = 1200.0
-
-
 @array_cache(64)
 def _unit(element, points):
     """Derivatives of the axis by xi at each point, the first and the second, (rows, nb), and the
@@ -238,8 +230,10 @@ class CableKernel(ElementKernel):
                 EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
                 square = float(np.max((EI - ES**2 / EA) / EA))  # E I about the centroid
             # exact for cubics: two Gauss points and a weighted middle one; a weight of 4/9 gives
-            # the three-point Gauss rule, which is the maximum
-            middle = min(alpha * MIDDLE * square / length**2, 4.0 / 9.0)
+            # the three-point Gauss rule, which is the maximum. 1200 is the stiffness of the mode
+            # that two points miss, in EI over the squared length of the beam; the third point has
+            # a quarter of it
+            middle = min(alpha * 1200.0 * square / length**2, 4.0 / 9.0)
             x, outer = 0.5 / np.sqrt(3.0 * (1.0 - middle)), 0.5 * (1.0 - middle)
             self._rule = np.array([0.5 - x, 0.5, 0.5 + x]), np.array([outer, middle, outer])
         else:
