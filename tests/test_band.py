@@ -52,7 +52,7 @@ def test_compiled_bands_are_the_dense_matrices(storage, sign, compiled):
 @pytest.fixture(scope="module")
 def compiled():
     from skfem_ancf.core.jit import entry
-    from skfem_ancf.core.packed import Packed
+    from skfem_ancf.core.source import Packed
 
     x, A = np.zeros(2), matrix(2, 1, "symmetric", 1)[1]
     found = [entry(f, (A, *args)) for f, *args in (

@@ -7,7 +7,7 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.beam.kernels import CableKernel, SectionKernel, loops, runs, tables
+from skfem_ancf.beam.kernels import CableKernel, SectionKernel, elements, loops, tables
 from skfem_ancf.beam.kernels.compiled import compiled_tables
 from skfem_ancf.beam.kernels.elements import Elements
 from skfem_ancf.core.code_cache import compiled_off
@@ -137,32 +137,32 @@ def test_loops_are_arrays(kind, mesh):
     (u, v), ld = states(k), 4 * k.nd + 6
     stiff = np.abs(k.tangents(u)).max()
     for t in k.tables:
-        x, y, ns = Elements(t), compiled_tables(t), len(t.start) * t.rows.shape[1]
+        x, y, ns = Elements(t), compiled_tables(t), len(t.start) * t.pattern.ns
         given = np.sin(np.arange(1.0, ns + 1.0))
         eigen, linear = given, t.law.kind == tables.LINEAR
         if not linear:
             eigen = 1e-3 * np.cos(np.arange(3.0 * t.weights.shape[1] * len(t.start)))
         f, g, A, B, S, T = (np.zeros(n) for n in (k.N, k.N, k.N * ld, k.N * ld, ns, ns))
         for one, *both in (
-                ((runs.run_force, u, none, none, none), (f, g)),
-                ((runs.run_force, u, none, none), (S, T)),
-                ((runs.run_force, u, none, given), (S, T), (f, g)),
-                ((runs.run_force, u, none, given, none), (f, g)),
-                ((runs.run_force, u, v, none, none), (f, g)),
-                ((runs.run_force, u, v, given), (S, T), (f, g)),
-                ((runs.run_linearised, u, v, given), (S, T)),
-                ((runs.run_linearised, u, v, none, none), (f, g)),
-                *(((runs.run_tangent, u, x), (S, T), (f, g), (A, B)) for x in (none, given)),
-                ((runs.run_unsymmetric, u, v), (A, B)),
-                ((runs.run_eigen_force, u, none, eigen), (f, g)),
-                ((runs.run_eigen_force, u, v, eigen), (f, g)),
-                ((runs.run_eigen_tangent, u, eigen), (A, B))):
+                ((elements.run_force, u, none, none, none), (f, g)),
+                ((elements.run_force, u, none, none), (S, T)),
+                ((elements.run_force, u, none, given), (S, T), (f, g)),
+                ((elements.run_force, u, none, given, none), (f, g)),
+                ((elements.run_force, u, v, none, none), (f, g)),
+                ((elements.run_force, u, v, given), (S, T), (f, g)),
+                ((elements.run_linearised, u, v, given), (S, T)),
+                ((elements.run_linearised, u, v, none, none), (f, g)),
+                *(((elements.run_tangent, u, x), (S, T), (f, g), (A, B)) for x in (none, given)),
+                ((elements.run_unsymmetric, u, v), (A, B)),
+                ((elements.run_eigen_force, u, none, eigen), (f, g)),
+                ((elements.run_eigen_force, u, v, eigen), (f, g)),
+                ((elements.run_eigen_tangent, u, eigen), (A, B))):
             run = one[0]
             for function, table, place in ((run, x, 0), (getattr(loops, run.__name__), y, 1)):
                 for pair in both:
                     pair[place][:] = 0.0
                 rest = [ld] * (both[-1][0] is A)
-                if run in (runs.run_force, runs.run_linearised) and both[-1][0] is S:
+                if run in (elements.run_force, elements.run_linearised) and both[-1][0] is S:
                     rest = [none]  # without forces
                 function(table, *one[1:], *(pair[place] for pair in both), *rest)
             for a, b in both:  # forces and tangents of one term of the energy may cancel

@@ -5,9 +5,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csr_matrix
-from skfem.assembly import Basis, FacetBasis
-from skfem.element import ElementVector
+from skfem import Basis, ElementVector, FacetBasis
 
 from ..core import (Array, ArrayLike, Immutable, Place, cached_property, read_only, refuse,
                     require_finite, require_flag, require_integer, require_kind, require_label,
@@ -116,7 +114,14 @@ class Beam(Immutable):
                  tolerance: float = 1e-3, damping: KelvinVoigt | None = None,
                  section: Section | None = None) -> None:
         require_kind("mesh", mesh, MeshBeam)
-        self.section = _section(section, width)
+        refuse(section is None and width is None, 'a beam has a section: give width=, that of a '
+               'rectangle, or section=, as Section.profile("IPE 200")')
+        refuse(section is not None and width is not None, "give a width or a section, not both: "
+               "got {!r} and {!r}", width, section)
+        if section is None:
+            section = Rectangle(width)  # type: ignore[arg-type]
+        self.section = require_kind("section", section, Section,
+                                    ', as Section.profile("IPE 200")')
         if self.section.has_materials:
             refuse(material is not None, "material must be None, since {!r} has its own, got {!r}",
                    self.section, material)
@@ -314,13 +319,11 @@ class Beam(Immutable):
 
     def strain(self, u: Array, X: Array, tind: Array | None = None) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), (3, nelements, npoints)."""
-        u, X, tind = self._checked(u, X, tind)
-        return on_grid(strain_at, self, u, X, tind)
+        return on_grid(strain_at, self, *self._checked(u, X, tind))
 
     def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), (3, nelements, npoints)."""
-        u, X, tind = self._checked(u, X, tind)
-        return on_grid(stress_at, self, u, X, tind)
+        return on_grid(stress_at, self, *self._checked(u, X, tind))
 
     def _checked(self, u, X, tind):
         u, X = require_finite("u", u, (self.N,)), require_finite("X", X)
@@ -363,21 +366,10 @@ class Beam(Immutable):
         load = self.masses.weights(require_finite("g", g, (2,)))
         return self.kernel.scatter(load + np.zeros((self.mesh.nelements, 1, 1)))
 
-    def mass(self) -> csr_matrix:
+    def mass(self) -> sparse.csr_matrix:
         """The constant mass matrix, sparse, shape (N, N)."""
         entries = kinematics.entries_of(self.basis.element_dofs.T)
         M = sparse.coo_matrix((self.mass_elements().ravel(), entries),
                               shape=(self.N, self.N)).tocsr()
         M.eliminate_zeros()
         return M
-
-
-def _section(section, width):
-    """The section, or a rectangle of the given width."""
-    refuse(section is None and width is None, 'a beam has a section: give width=, that of a '
-           'rectangle, or section=, as Section.profile("IPE 200")')
-    if section is None:
-        return Rectangle(width)
-    refuse(width is not None, "give a width or a section, not both: got {!r} and {!r}", width,
-           section)
-    return require_kind("section", section, Section, ', as Section.profile("IPE 200")')

@@ -2,21 +2,18 @@
 bodies for all local functions at once."""
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import reverse_cuthill_mckee
-from skfem import Basis, BilinearForm, ElementVector, LinearForm
-from skfem.assembly import Functional
-from skfem.assembly.dofs import DofsView
+from skfem import Basis, BilinearForm, DofsView, ElementVector, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.helpers import dot
 
-from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError, explained,
-                    gauss, read_only, refuse, refuse_any, require_finite, require_label,
-                    require_like, require_option, require_positive, require_slope, shown)
+from ..core import (Array, ArrayLike, CallbackError, Immutable, InputError, MeshError,
+                    cached_property, explained, gauss, read_only, refuse, refuse_any,
+                    require_finite, require_label, require_like, require_option, require_positive,
+                    require_slope)
 from ..materials import HistoryMaterial, Material
 from ..mesh.places import as_point, is_point
 from ..sections.section import evaluated
@@ -131,12 +128,6 @@ def grade_at(function: Any, x: Array, what: str) -> Any:
     return evaluated(what, function, *x)
 
 
-#: Gauss points for the work of the residual from the reference configuration, and in a time step.
-WORK, STEP = 6, 3
-#: Tolerance of points outside of the reference cell, and iterations for local coordinates.
-OUTSIDE, ITERATIONS = 1e-6, 12
-
-
 class Domain(Immutable):
     """A two-dimensional body given by a basis and forms of scikit-fem, a member of a Scene.
 
@@ -205,17 +196,32 @@ class Domain(Immutable):
 
     def __init__(self, basis: Basis, residual: LinearForm, tangent: BilinearForm,
                  mass: BilinearForm | None = None, name: str | None = None) -> None:
-        _require_plane(basis)
+        refuse(not isinstance(basis, Basis), "a Domain needs a Basis of scikit-fem, got {!r}",
+               basis)
+        refuse(basis.mesh.dim() != 2, "a Domain is plane, as beams are, got a mesh of dimension "
+               "{}: {!r}", basis.mesh.dim(), basis.mesh)
+        refuse(not isinstance(basis.elem, ElementVector) or basis.elem.dim != 2, "the unknown of a "
+               "Domain is a displacement with two components: use an "
+               "ElementVector(ElementQuad2()), got {!r}", basis.elem)
+        refuse(len(np.unique(basis.element_dofs)) < basis.N, "the basis of a Domain must cover its "
+               "whole mesh: for a part of it use mesh.restrict(elements)")
         for what, form, kind in (("residual", residual, LinearForm),
                                  ("tangent", tangent, BilinearForm), ("mass", mass, BilinearForm)):
-            if not (isinstance(form, kind) or (form is None and what == "mass")):
-                hint = ("; of a linear problem with the BilinearForm a it is LinearForm(lambda v, "
-                        "w: a.form(w['u'], v, w))" if isinstance(form, BilinearForm) else "")
-                raise InputError(f"{what} of a Domain is a {kind.__name__} of scikit-fem, got "
-                                 f"{shown(form)}{hint}")
+            refuse(not (isinstance(form, kind) or (form is None and what == "mass")),
+                   "{} of a Domain is a {} of scikit-fem, got {!r}{}", what, kind.__name__, form,
+                   "; of a linear problem with the BilinearForm a it is LinearForm(lambda v, w: "
+                   "a.form(w['u'], v, w))" * isinstance(form, BilinearForm))
         self.basis, self.residual, self.tangent, self.mass = basis, residual, tangent, mass
         self.name = require_label("name", name)
         self.N: int = basis.N
+        #: Names of both components.
+        self.dofnames = ["u^1", "u^2"]
+        #: Mean of the vertices, shape (2,).
+        self.origin = np.asarray(basis.mesh.p.mean(axis=1))
+        #: The larger of width and height.
+        self.size = float(np.max(np.ptp(basis.mesh.p, axis=1)))
+        #: Typical changes of the DOFs when the domain moves by its size, (N,).
+        self.sizes = np.full(basis.N, self.size)
         # a numbering of the DOFs with a small bandwidth: reverse Cuthill-McKee, or along
         # x or y
         pairs, n = basis.element_dofs[::2] // 2, basis.N // 2
@@ -223,11 +229,13 @@ class Domain(Immutable):
         i, j = np.repeat(pairs, k, axis=0).ravel(), np.tile(pairs, (k, 1)).ravel()
         graph = sparse.csr_matrix((np.ones(len(i)), (i, j)), shape=(n, n))
         x, y = basis.doflocs[:, ::2]
-        orders = [reverse_cuthill_mckee(graph, symmetric_mode=True), np.lexsort((y, x)),
-                  np.lexsort((x, y))]
+        orders = [sparse.csgraph.reverse_cuthill_mckee(graph, symmetric_mode=True),
+                  np.lexsort((y, x)), np.lexsort((x, y))]
         order = min(orders, key=lambda order: np.max(np.ptp(np.argsort(order)[pairs], axis=0)))
         self._order = (2 * order[:, None] + np.arange(2)).ravel()
         self._rank = np.argsort(self._order)
+        #: Number of subdiagonals.
+        self.bandwidth = int(np.max(np.ptp(self.numbers(basis.element_dofs), axis=0)))
         self._require_derivatives()
 
     @classmethod
@@ -349,7 +357,7 @@ class Domain(Immutable):
         if self._solid is not None:
             return float(self._ask("energy", self._solid.energy.assemble, self.basis,
                                    **self._with(u)))
-        return float(sum(w * (self.force(s * u) @ u) for s, w in zip(*gauss(WORK))))
+        return float(sum(w * (self.force(s * u) @ u) for s, w in zip(*gauss(6))))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """Mean of the internal force on a straight path between two displacements.
@@ -360,7 +368,7 @@ class Domain(Immutable):
             Displacements at the start and the end, shape (N,).
         """
         d = u1 - u0
-        return sum((w * self.force(u0 + s * d) for s, w in zip(*gauss(STEP))), np.zeros(self.N))
+        return sum((w * self.force(u0 + s * d) for s, w in zip(*gauss(3))), np.zeros(self.N))
 
     def inverted(self, u: Array) -> bool:
         """True if a cell is turned inside out at a displacement (N,)."""
@@ -378,16 +386,6 @@ class Domain(Immutable):
 
     # the interface of a beam
 
-    @property
-    def dofnames(self) -> list[str]:
-        """Names of both components."""
-        return ["u^1", "u^2"]
-
-    @property
-    def bandwidth(self) -> int:
-        """Number of subdiagonals."""
-        return int(np.max(np.ptp(self.numbers(self.basis.element_dofs), axis=0)))
-
     @cached_property
     def q0_local(self) -> Array:
         """DOFs of the position relative to :attr:`origin`, (N,)."""
@@ -397,21 +395,6 @@ class Domain(Immutable):
     def q0(self) -> Array:
         """DOFs of the position, (N,)."""
         return self.q0_local + self.rigid_motions()[:, :2] @ self.origin
-
-    @property
-    def origin(self) -> Array:
-        """Mean of the vertices, shape (2,)."""
-        return np.asarray(self.basis.mesh.p.mean(axis=1))
-
-    @property
-    def size(self) -> float:
-        """The larger of width and height."""
-        return float(np.max(np.ptp(self.basis.mesh.p, axis=1)))
-
-    @property
-    def sizes(self) -> Array:
-        """Typical changes of the DOFs when the domain moves by its size, (N,)."""
-        return np.full(self.N, self.size)
 
     @cached_property
     def scale(self) -> float:
@@ -547,11 +530,18 @@ class Domain(Immutable):
                                          & (point[:, None] <= high + pad), axis=0))
             if not len(near):
                 continue
-            X = _local(mapping, point, near)
+            # not mapping.invF, which fails for all cells if one does not converge
+            X = np.full((2, len(near), 1), 1.0 / 3.0)
+            with np.errstate(all="ignore"):
+                for _ in range(12):
+                    rest = point[:, None] - mapping.F(X, tind=near)[..., 0]
+                    D = np.moveaxis(mapping.DF(X, tind=near)[..., 0], -1, 0)
+                    X = X + np.linalg.solve(D, rest.T[..., None]).transpose(1, 0, 2)
+            X = X[..., 0]
             out = np.maximum(-X.min(axis=0), (X.sum(axis=0) if mesh.t.shape[0] == 3 else
                                               X.max(axis=0)) - 1.0)
             best = int(np.argmin(np.where(np.isfinite(out), out, np.inf)))
-            if out[best] <= OUTSIDE:
+            if out[best] <= 1e-6:
                 cells[k], local[:, k] = near[best], X[:, best]
         return cells, local
 
@@ -569,20 +559,16 @@ class Domain(Immutable):
         cells, X = self._locate(x)
         refuse_any(cells < 0, "the point {:.6g} is outside of {!r}", x, self, error=MeshError)
         dofs = self.numbers(self.basis.element_dofs[:, cells]).reshape(-1, 2, len(cells))
-        return dofs.swapaxes(0, 1), self._functions(X[:, :, None], cells)[..., 0]
+        return dofs.swapaxes(0, 1), self._functions(X[:, :, None], cells)[0][..., 0]
 
     def _functions(self, X, cells=None):
-        """Scalar shape functions (k, n, points) at points of the reference cell."""
-        return np.array([np.asarray(field)[0] for field in self._fields(X, cells)])
-
-    def _gradients(self, X, cells=None):
-        """Their gradients (k, 2, n, points)."""
-        return np.array([np.asarray(field.grad)[0] for field in self._fields(X, cells)])
-
-    def _fields(self, X, cells):
+        """Scalar shape functions (k, n, points) and gradients (k, 2, n, points) at points of the
+        reference cell."""
         basis = self.basis
-        return [basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0]
-                for k in range(0, basis.Nbfun, 2)]
+        fields = [basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0]
+                  for k in range(0, basis.Nbfun, 2)]
+        return (np.array([np.asarray(field)[0] for field in fields]),
+                np.array([np.asarray(field.grad)[0] for field in fields]))
 
 
 class DomainPoints:
@@ -605,7 +591,7 @@ class DomainPoints:
     def fields(self, u: Array) -> tuple[Array, Array]:
         """Displacement (2, n) and its gradient (2, 2, n) for DOFs ``u`` (N,) of the scene."""
         cells, X = self.body._locate(self.start)
-        slopes = self.body._gradients(X[:, :, None], cells)[..., 0]
+        slopes = self.body._functions(X[:, :, None], cells)[1][..., 0]
         return self.displacement(u), np.einsum("kjn,ikn->ijn", slopes, u[self.slice][self._dofs])
 
 
@@ -620,31 +606,9 @@ def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array
     cell = mesh.init_refdom().refined(parts)
     x = np.asarray(basis.mapping.F(cell.p))
     dofs = domain.numbers(basis.element_dofs).reshape(-1, 2, mesh.nelements)
-    grads = domain._gradients(cell.p)
-    moved = np.einsum("kep,kce->cep", domain._functions(cell.p), u[dofs])
+    functions, grads = domain._functions(cell.p)
+    moved = np.einsum("kep,kce->cep", functions, u[dofs])
     gradient = np.einsum("kjep,kce->cjep", grads, u[dofs])
     first = cell.p.shape[1] * np.arange(mesh.nelements)
     cells = (first[:, None, None] + cell.t.T).reshape(-1, len(cell.t))
     return x.reshape(2, -1), moved.reshape(2, -1), gradient.reshape(2, 2, -1), cells
-
-
-def _require_plane(basis):
-    refuse(not isinstance(basis, Basis), "a Domain needs a Basis of scikit-fem, got {!r}", basis)
-    refuse(basis.mesh.dim() != 2, "a Domain is plane, as beams are, got a mesh of dimension {}: "
-           "{!r}", basis.mesh.dim(), basis.mesh)
-    if not isinstance(basis.elem, ElementVector) or basis.elem.dim != 2:
-        raise InputError("the unknown of a Domain is a displacement with two components: use an "
-                         f"ElementVector(ElementQuad2()), got {shown(basis.elem)}")
-    refuse(len(np.unique(basis.element_dofs)) < basis.N, "the basis of a Domain must cover its "
-           "whole mesh: for a part of it use mesh.restrict(elements)")
-
-
-def _local(mapping, point, cells):
-    """Local coordinates (2, n) of a point in cells (n,), by Newton's method."""
-    X = np.full((2, len(cells), 1), 1.0 / 3.0)
-    with np.errstate(all="ignore"):
-        for _ in range(ITERATIONS):
-            rest = point[:, None] - mapping.F(X, tind=cells)[..., 0]
-            D = np.moveaxis(mapping.DF(X, tind=cells)[..., 0], -1, 0)
-            X = X + np.linalg.solve(D, rest.T[..., None]).transpose(1, 0, 2)
-    return X[..., 0]

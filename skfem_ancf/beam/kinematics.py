@@ -10,9 +10,6 @@ from ..mesh.places import as_point
 from .kernels import CableKernel, SectionKernel
 from .strains import cable_axis, fibres, points_of_grid
 
-#: Relative deflection of a cantilever by shear that gives a warning if neglected.
-SHEARED = 1e-3
-
 #: Kernels of the strain energy by the kinematics of elements.
 KERNELS: dict[str, Any] = {"sections": SectionKernel, "cable": CableKernel}
 
@@ -27,7 +24,7 @@ def require_cable(beam: Any) -> None:
     if GA is None:
         return
     share = 3.0 * section.EI / (GA * float(np.min(beam.mesh.chain_lengths))**2)
-    if share > SHEARED:
+    if share > 1e-3:
         warn(f"a cable has no shear deformation and ignores GA={GA:g} of {section!r}, which would "
              f"add {share:.1%} to the deflection of a cantilever of its length: use an element "
              "with sections, as ElementBeamANCFCubic(2), or leave GA out", ModelWarning)

@@ -4,7 +4,7 @@ numbers. Several points are an array (2, n), as in scikit-fem, or a list of poin
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -33,9 +33,8 @@ class Layout:
 
     def __init__(self, *members: Beam | RigidBody | Domain) -> None:
         for one in members:
-            if not isinstance(one, (Beam, RigidBody, Domain)):
-                raise InputError("a scene is made of Beams, RigidBodies and Domains, got "
-                                 f"{shown(one)}")
+            refuse(not isinstance(one, (Beam, RigidBody, Domain)), "a scene is made of Beams, "
+                   "RigidBodies and Domains, got {!r}", one)
         refuse(not members, "a scene needs at least a Beam, a RigidBody or a Domain, got none")
         names = [one.name for one in members if one.name is not None]
         refuse(len(set(names)) < len(names) or len(set(map(id, members))) < len(members), "the "
@@ -77,40 +76,31 @@ class Layout:
 
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
     """A beam by object, name or number; None for the only one."""
-    if beam is None and len(beams) == 1:
-        return beams[0]
-    found: Sequence[Beam] = ()
-    if isinstance(beam, Beam):
-        found = [b for b in beams if b is beam]
-    elif isinstance(beam, str):
-        found = [b for b in beams if b.name == beam]
-    elif isinstance(beam, int) and not isinstance(beam, bool) and beam >= 0:
-        found = list(beams[beam:beam + 1])
-    if found:
-        return found[0]
-    known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
-    refuse(not beams, "a beam is needed here, and the scene has none: give one of its members, its "
-           "name or its number; got {!r}", beam)
-    refuse(beam is None, "the scene has {} beams: choose one with beam=, of {}", len(beams), known)
-    refuse(isinstance(beam, (RigidBody, Domain)), "a beam is needed here, got {!r}; beams are {}",
-           beam, known)
-    raise NameUnknown("beam", beam, known)
+    return cast("Beam", select_member(beams, (), beam))
 
 
 def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody | Domain],
                   which: WhichMember) -> Beam | RigidBody | Domain:
     """A beam, or a rigid body or domain, numbered after the beams; None for the only one."""
-    if which is None and not beams and len(bodies) == 1:
-        return bodies[0]
-    if which is None or not bodies:
-        return select_beam(beams, which)
-    members = *beams, *bodies
-    if isinstance(which, (RigidBody, Domain)):
-        if any(b is which for b in bodies):
-            return which
-        raise NameUnknown("rigid body or domain", which, [b.name or len(beams) + k
-                                                for k, b in enumerate(bodies)])
-    return select_beam(members, which)  # type: ignore[arg-type]
+    members: Sequence[Any] = beams if which is None and beams else (*beams, *bodies)
+    found: Sequence[Any] = [one for one in members if one is which]
+    if which is None:
+        found = members if len(members) == 1 else ()
+    elif isinstance(which, str):
+        found = [one for one in members if one.name == which]
+    elif isinstance(which, int) and not isinstance(which, bool) and which >= 0:
+        found = members[which:which + 1]
+    if found:
+        return found[0]
+    known = [one.name if one.name is not None else k for k, one in enumerate(members)]
+    if bodies and isinstance(which, (RigidBody, Domain)):
+        raise NameUnknown("rigid body or domain", which, known[len(beams):])
+    refuse(not beams and (which is None or not bodies), "a beam is needed here, and the scene has "
+           "none: give one of its members, its name or its number; got {!r}", which)
+    refuse(which is None, "the scene has {} beams: choose one with beam=, of {}", len(beams), known)
+    refuse(isinstance(which, (RigidBody, Domain)), "a beam is needed here, got {!r}; beams are {}",
+           which, known)
+    raise NameUnknown("beam", which, known)
 
 
 def as_points(points: Any) -> Array:
@@ -127,10 +117,6 @@ def as_points(points: Any) -> Array:
     return require_point(points)
 
 
-#: Tolerance of points on the axis of a cable, relative to the height.
-ON_AXIS = 1e-12
-
-
 class BeamPoints:
     """Points ``X`` (2, n) of the reference cells of elements ``e`` (n,) of one beam. Among the
     requested points they have the numbers ``index`` (n,), None if they are all."""
@@ -142,7 +128,7 @@ class BeamPoints:
         #: Points of the reference cell in the shape (2, n, 1).
         self.at = X[:, :, None]
         #: A point is off the axis of a cable, where positions are nonlinear.
-        self.off_axis = not beam.has_sections and bool((np.abs(X[1] - 0.5) > ON_AXIS).any())
+        self.off_axis = not beam.has_sections and bool((np.abs(X[1] - 0.5) > 1e-12).any())
 
     @cached_property
     def start(self) -> Array:
@@ -290,9 +276,17 @@ class PointLocator:
             beam = select_beam(self.beams, beam)
             points = as_point(points, beam.mesh)
         if self.bodies:
-            found = self._of_body(points, beam)
-            if found is not None:
-                return found
+            if isinstance(points, RigidBody):
+                points, beam = points.position, points
+            if beam is not None or not self.beams and len(self.bodies) == 1:
+                body = select_member(self.beams, self.bodies, beam)
+                if isinstance(body, (RigidBody, Domain)):
+                    if points is None and isinstance(body, RigidBody):
+                        points = body.position
+                    x = as_points(points)
+                    start = x.reshape(2, -1)
+                    return Located(x.ndim == 1, start.shape[1],
+                                   [self._in_body(body, None, start)])
         if isinstance(points, (int, float)):
             as_points(points)  # raises: x and y were given as two arguments
         if beam is not None:
@@ -330,7 +324,12 @@ class PointLocator:
 
     def _ask(self, x, beams):
         """Raise InputError: several axes are nearest to a point, shape (2, 1)."""
-        around = [(off, b, chain) for b in beams for off, chain in b.finder.chains_at(x)]
+        around = []
+        for b in beams:
+            for chain in range(int(b.mesh.chains[-1]) + 1):
+                e, X, outside, _ = b.finder.find(x, chain)
+                if outside[0] == 0.0:
+                    around.append((float(b.finder.from_axis(e, X)[0]), b, chain))
         least = min(off for off, *_ in around)
         found = [(b, chain) for off, b, chain in around if off <= least + b.finder.equal]
         where = f"the point {shown(tuple(map(float, x[:, 0])))} is equally close to the axes of "
@@ -341,18 +340,6 @@ class PointLocator:
         numbers = sorted(chain if self._lines is None else int(
             self._lines[self._chains[self.beams.index(b)] + chain]) for b, chain in found)
         raise InputError(f"{where}lines {numbers}: choose one, as line={numbers[0]}")
-
-    def _of_body(self, points, beam):
-        if isinstance(points, RigidBody):
-            points, beam = points.position, points
-        elif beam is None and (self.beams or len(self.bodies) > 1):
-            return None
-        body = select_member(self.beams, self.bodies, beam)
-        if not isinstance(body, (RigidBody, Domain)):
-            return None
-        x = as_points(body.position if points is None and isinstance(body, RigidBody) else points)
-        start = np.reshape(x, (2, -1))
-        return Located(x.ndim == 1, start.shape[1], [self._in_body(body, None, start)])
 
     def _in_body(self, body, index, start):
         kind = DomainPoints if isinstance(body, Domain) else BodyPoints
@@ -366,8 +353,8 @@ class PointLocator:
         several, parts = np.zeros(x.shape[1], dtype=bool), list[Any]()
         for k, candidate in enumerate(self.beams):
             finder = candidate.finder
-            x0, x1, y0, y1 = finder.box
-            near = np.flatnonzero((x0 <= x[0]) & (x[0] <= x1) & (y0 <= x[1]) & (x[1] <= y1))
+            low, high = finder.box
+            near = np.flatnonzero(((low <= x) & (x <= high)).all(axis=0))
             if not len(near):
                 continue
             e, X, outside, tied = finder.find(x[:, near])

@@ -64,24 +64,6 @@ def points_along(beam: Any) -> int:
     return beam.element.axis_degree + 1 + more
 
 
-def masses_of(beam: Any) -> Masses:
-    if not beam.has_sections:
-        return _of_cable(beam)
-    across, element, mesh, n = beam.across, beam.element, beam.mesh, points_along(beam)
-    tind, parts = np.array([0]) if across.uniform else None, []
-    similar = mesh.is_straight and mesh.heights is None and element.by_reference
-    for layer in across.layers:
-        measure = layer.measure if layer.inertia is None else layer.inertia
-        X, W, N = _unit(element, n, measure)
-        if similar:
-            length = mesh.lengths[slice(None) if tind is None else tind, None]
-            N = N * element.powers(mesh.height, length).T[:, :, None]
-        else:
-            N = element.values(mesh.mapping(), X, tind)
-        parts.append((N, across.volume(layer, X, W, tind, times="density", full=True)))
-    return Masses(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
-
-
 @lru_cache(64)
 def _unit(element, n, measure):
     """Points and weights, and functions (nb, 1, points) of an element of unit length and height."""
@@ -96,24 +78,31 @@ def _at_gauss(element, n):
     return np.array(element.local(np.array([xi, 0.5 + 0.0 * xi]), 1.0)[:2])[:, :, None]
 
 
-def _of_cable(beam):
-    """The Masses of a cable, with rotary inertia."""
-    across, mapping = beam.across, beam.mesh.mapping()
-    n = points_along(beam)
+def masses_of(beam: Any) -> Masses:
+    """The Masses of a beam; cables have rotary inertia."""
+    across, element, mesh, n = beam.across, beam.element, beam.mesh, points_along(beam)
+    mapping, tind, parts = mesh.mapping(), np.array([0]) if across.uniform else None, []
+    length = mesh.lengths[slice(None) if tind is None else tind, None]
+    if beam.has_sections:
+        similar = mesh.is_straight and mesh.heights is None and element.by_reference
+        for layer in across.layers:
+            measure = layer.measure if layer.inertia is None else layer.inertia
+            X, W, N = _unit(element, n, measure)
+            N = (N * element.powers(mesh.height, length).T[:, :, None] if similar else
+                 element.values(mapping, X, tind))
+            parts.append((N, across.volume(layer, X, W, tind, times="density", full=True)))
+        return Masses(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
     xi, w = gauss(n)
-    tind = np.array([0]) if across.uniform else None
-    moments = across.moments(xi, tind, "mass")
-    if beam.mesh.is_straight and beam.element.by_reference:
-        length = beam.mesh.lengths[slice(None) if tind is None else tind, None]
-        N, d_xi = _at_gauss(beam.element, n) * beam.element.powers(1.0, length).T[:, :, None]
-        moments *= w * length
+    moments = across.moments(xi, tind, "mass") * w
+    if mesh.is_straight and element.by_reference:
+        N, d_xi = _at_gauss(element, n) * element.powers(1.0, length).T[:, :, None]
+        moments *= length
         return Masses(N, moments[0], d_xi / length, moments[1:])
-    mass, first, second = moments * w
     X = np.array([xi, 0.5 + 0.0 * xi])
-    N, d_xi, _ = beam.element.of_mesh(mapping, X, tind)
+    N, d_xi, _ = element.of_mesh(mapping, X, tind)
     # arc length, since the interpolated tangent is shorter than one
     speed = np.hypot(*mapping.DF(X, tind)[:, 0])
-    mass, first, second = mass * speed, first * speed, second * speed
+    mass, first, second = moments * speed
     # volume of a curved beam: that of its axis times 1 - Y / R
     faces = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], len(xi))])
     bottom, top = np.split(mapping.full_volume(faces, tind), 2, axis=-1)

@@ -5,14 +5,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.band import add_multiple, clear
-from ..core import I1, I2, Array, cached_property, primitive, source
+from ..core import I1, I2, Array, add_multiple, cached_property, clear, primitive, source
 from .beam import Beam
-from .kernels.elements import Elements
+from .kernels.elements import (Elements, run_accept, run_eigen_force, run_eigen_tangent, run_force,
+                               run_linearised, run_put, run_tangent, run_unsymmetric)
 from .kernels.kernel import ElementsWithHistory, Past, elements_of, remembering
 from .kernels.tables import CABLE, LINEAR, StrainTables, repeated, scaled, together
-from .kernels.runs import (run_accept, run_eigen_force, run_eigen_tangent, run_force,
-                           run_linearised, run_put, run_tangent, run_unsymmetric)
 
 #: Columns of the table of a body: begin and end of stresses; kind.
 BEGIN, END, KIND = range(3)
@@ -61,37 +59,34 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = Fal
     # With ``joined``, tables with the same samples are merged, so that many short beams are as fast
     # as a long one.
     if len(beams) == 1:
-        return _body([beams[0].kernel.tables], lambda t: t.rows.shape[1], beams[0].kernel)
+        return _body([beams[0].kernel.tables], beams[0].kernel)
     tables = [[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
               for beam, s in zip(beams, slices)]
     if joined:
         groups: dict[Any, list[StrainTables]] = {}
         # left nodes of a table are unique: tables of one beam stay separate
         for k, (j, t) in enumerate(pair for its in tables for pair in enumerate(its)):
-            groups.setdefault((j, _samples(t)) if t.law.kind == LINEAR else k, []).append(t)
+            key = t.pattern, t.G.shape[1:], len(t.C) > 0, t.weights.shape[1], t.along.tobytes()
+            groups.setdefault((j, key) if t.law.kind == LINEAR else k, []).append(t)
         tables = [[together(some) for some in groups.values()]]
-    return _body(tables, lambda t: t.rows.shape[1])
-
-
-def _samples(t):
-    """Key of tables that can be merged."""
-    return (t.pattern, t.G.shape[1:], len(t.C) > 0, t.weights.shape[1], t.along.tobytes())
+    return _body(tables)
 
 
 def eigenstrain_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Body:
     """The Body of eigenstrains: stresses for tables of linear laws, else strains at the points."""
     return _body([[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
-                  for beam, s in zip(beams, slices)],
-                 lambda t: t.rows.shape[1] if t.law.kind == LINEAR else
-                 (1 if t.kind == CABLE else 3) * t.weights.shape[1])
+                  for beam, s in zip(beams, slices)], at_points=True)
 
 
-def _body(tables, numbers, kernel=None):
+def _body(tables, kernel=None, at_points=False):
     rows, at = [], 0
     flat = tuple(t for its in tables for t in its)
     for t in flat:
-        size = numbers(t) * len(t.start)
-        rows.append([at, at + size, t.kind])
+        kind, number = t.pattern.kind, t.pattern.ns
+        if at_points and t.law.kind != LINEAR:
+            number = (1 if kind == CABLE else 3) * t.weights.shape[1]
+        size = number * len(t.start)
+        rows.append([at, at + size, kind])
         at += size
     return Body(flat, np.array(rows, np.int64).reshape(-1, KIND + 1), kernel)
 
@@ -140,7 +135,7 @@ def _stress(body, k, stresses):
 
 @source
 def _add_force(body, u0, u1, given, out, f):
-    """Add forces and write stresses of all tables, see :func:`~.kernels.runs.run_force`."""
+    """Add forces and write stresses of all tables, see :func:`~.kernels.elements.run_force`."""
     for k in range(body.table.shape[0]):
         run_force(tables_of(body, k), u0, u1, _stress(body, k, given), _stress(body, k, out), f)
 

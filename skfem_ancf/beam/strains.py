@@ -90,28 +90,6 @@ def cable_forces(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Array, Array
     return N, M
 
 
-# Green-Lagrange strain from the displacement derivatives a along the axis and b across it (pairs of
-# arrays); (x, y) is the tangent of the axis in the reference configuration.
-
-
-def along_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """eps_xx."""
-    return (x + 0.5 * a[0]) * a[0] + (y + 0.5 * a[1]) * a[1]
-
-
-def across_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """eps_yy."""
-    return (0.5 * b[0] - y) * b[0] + (x + 0.5 * b[1]) * b[1]
-
-
-def shear(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """2 eps_xy."""
-    return (x + a[0]) * b[0] + (y + a[1]) * b[1] - y * a[0] + x * a[1]
-
-
-STRAINS = along_axis, across_axis, shear
-
-
 class Interpolation:
     """Displacements as Chebyshev sums ``c_ij T_i(2 xi - 1) T_j(2 eta - 1)``."""
 
@@ -132,7 +110,9 @@ class Interpolation:
         self.table = mesh.height ** swell[:, None, None] * unit
         n = p + mapping.height_degree * int(swell.max())
         self.shape, self.swell = (n, m), swell
-        self.by_xi, self.by_eta = _slope_matrix(n), _slope_matrix(m)
+        #: Matrices from Chebyshev coefficients to those of the derivative.
+        self.by_xi, self.by_eta = (
+            np.vstack([2.0 * chebder(np.eye(k)), np.zeros(k)]) for k in (n, m))
         self.slope = element.local(np.zeros((2, 1)), 1.0)[3]
 
     def height_at(self, e: Array, xi: Array) -> Any:
@@ -166,12 +146,6 @@ def places(n: int) -> Array:
 def transform(n: int) -> Array:
     """Matrix (n, n) from values at :func:`places` to Chebyshev coefficients."""
     return np.linalg.inv(chebvander(2.0 * places(n) - 1.0, n - 1))
-
-
-def _slope_matrix(n):
-    out = np.zeros((n, n))
-    out[:-1] = 2.0 * chebder(np.eye(n))
-    return out
 
 
 class Gradients:
@@ -228,27 +202,28 @@ def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
         return np.array([xx, ratio * xx, 0.0 * xx])
     rows = (0, 1, 2) if term is None else getattr(term.law, "rows", (0, 1, 2))
     samples = (term or beam.terms[0]).samples
-    gradients, out = Gradients(beam, u, e), np.zeros((3, len(e)), np.result_type(u, float))
-    for eta, weight in ((X[1], 1.0),) if across is None else zip(*across):
-        for place, wanted in _sampled_at(samples, rows, X[0]):
-            a, b, t = gradients(X[0] if place is None else place, eta)
-            for row, w in wanted:
-                out[row] += weight * w * STRAINS[row](a, b, *t)
-    return out
-
-
-def _sampled_at(samples, rows, xi):
-    """Sampling points along the axis (None: the points themselves), with components and weights."""
-    found: dict[Any, list[Any]] = {}
+    # sampling points along the axis (None: the points themselves), with components and weights
+    sampled: dict[Any, list[Any]] = {}
     for row in rows:
         nodes = samples.get(COMPONENTS[row])
         if nodes is None:
-            found.setdefault(None, []).append((row, 1.0))
+            sampled.setdefault(None, []).append((row, 1.0))
         else:
-            T = [chebvander(2.0 * np.asarray(x) - 1.0, len(nodes) - 1) for x in (nodes, xi)]
+            T = [chebvander(2.0 * np.asarray(x) - 1.0, len(nodes) - 1) for x in (nodes, X[0])]
             for place, w in zip(nodes, np.linalg.solve(T[0].T, T[1].T)):
-                found.setdefault(float(place), []).append((row, w))
-    return found.items()
+                sampled.setdefault(float(place), []).append((row, w))
+    gradients, out = Gradients(beam, u, e), np.zeros((3, len(e)), np.result_type(u, float))
+    for eta, weight in ((X[1], 1.0),) if across is None else zip(*across):
+        for place, wanted in sampled.items():
+            a, b, (x, y) = gradients(X[0] if place is None else place, eta)
+            # from the displacement derivatives a along the axis and b across it; (x, y) is the
+            # tangent of the axis in the reference configuration
+            for row, w in wanted:
+                out[row] += weight * w * (
+                    (x + 0.5 * a[0]) * a[0] + (y + 0.5 * a[1]) * a[1] if row == 0 else
+                    (0.5 * b[0] - y) * b[0] + (x + 0.5 * b[1]) * b[1] if row == 1 else
+                    (x + a[0]) * b[0] + (y + a[1]) * b[1] - y * a[0] + x * a[1])
+    return out
 
 
 def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:

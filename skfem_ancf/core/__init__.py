@@ -17,10 +17,9 @@ from .immutable import (Immutable, array_cache, cached_property, is_builtin, pic
 from .quadrature import gauss, gauss_lobatto, hermite_basis, lagrange, product_rule, tensor
 from .linear import angle_of, first_order, step, stress_of, unwrapped
 from .archive import output_file
-from .band import Band, BandMatrix, Inertia
+from .band import Band, BandMatrix, Inertia, add_multiple, clear
 from .callbacks import (call_custom, call_loaded, call_solver, custom_distance, deferred, handle_of,
                         owner, raise_kept)
-from .packed import Packed, constant, hints
 from .progress import announced_bar, progress_bar
-from .source import (C1, C2, C3, F1, F2, F3, I1, I2, I3, MADE, apart, everywhere, indices,
-                     primitive, room, shaped, somewhere, source, where)
+from .source import (C1, C2, C3, F1, F2, F3, I1, I2, I3, MADE, Packed, apart, constant, everywhere,
+                     hints, indices, primitive, room, shaped, somewhere, source, where)

@@ -14,11 +14,6 @@ import numpy as np
 from .errors import FileError, retold
 from .types import Array, ArrayLike, StrPath
 
-#: Longest stem of a temporary file's name; names are limited to 255 characters.
-STEM = 100
-#: NumPy kinds of arrays in files.
-KINDS = "biufcUS"
-
 
 class Unreadable(ValueError):
     """A file is damaged, or was not written by :func:`write`."""
@@ -40,7 +35,7 @@ def read(path: Path) -> dict[str, Array]:
         except Exception as error:  # any content
             raise Unreadable(f"{type(error).__name__}: {error}") from None
     for name, array in arrays.items():
-        if array.dtype.kind not in KINDS:
+        if array.dtype.kind not in "biufcUS":
             raise Unreadable(f"the array {name!r} has the type {array.dtype}, neither numbers nor "
                              "texts")
     return arrays
@@ -51,7 +46,8 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
     """A new, empty file that replaces ``path`` when the block ends, or is removed on an error."""
     # Links are not followed, and the file mode is kept. With ``durable`` the new file, of the same
     # suffix, is synchronised to disk first.
-    new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
+    # names are limited to 255 characters
+    new = path.with_name(f".{path.stem[:100]}.{token_hex(8)}.part{path.suffix}")
     new.touch(0o600 if path.is_file() else 0o666, exist_ok=False)
     try:
         yield new

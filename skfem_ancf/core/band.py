@@ -8,14 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse.linalg import splu
 
 from .callbacks import call_solver, handle_of
 from .source import F1, F2, I1, apart, indices, primitive, shaped, source
-from .types import Array
+from .types import Array, ArrayLike
 
 #: Zeros after each column of a lower half, for vectorised loops over four columns.
 SPARE = 6
@@ -149,17 +148,12 @@ class BandMatrix(Band):
             self.factors = Band(self.flat.copy(), *self[1:5])
             if _cholesky(self.factors):
                 return self
-        self.factors, general = None, self.general()
-        if not factorize(general):
+        self.factors, both = None, BandMatrix.zeros(self.n, self.width, symmetric=False)
+        add_scaled(self, 0.0, both)
+        if not factorize(both):
             raise np.linalg.LinAlgError("the matrix is singular")
-        self.factors = general
+        self.factors = both
         return self
-
-    def general(self) -> "BandMatrix":
-        """A copy with both halves stored."""
-        out = BandMatrix.zeros(self.n, self.width, symmetric=False)
-        add_scaled(self, 0.0, out)
-        return out
 
     def solve(self, b: Array) -> Array:
         """Solve with the factors for ``b`` (n,) or (n, k)."""
@@ -181,20 +175,25 @@ class BandMatrix(Band):
         return self.factors.flat[::self.factors.ld].copy()
 
     def inertia(self) -> Inertia:
-        """Inertia of a symmetric matrix, by Sylvester's law."""
-        # If Cholesky fails, the matrix is eliminated block by block along the chain; blocks whose
-        # elimination lets entries grow are merged with the next. ValueError if it is not symmetric.
+        """Inertia of the symmetric part, by Sylvester's law."""
         if not self.symmetric:
-            raise ValueError("the inertia needs a symmetric matrix")
+            return self.symmetric_part().inertia()
         if self.factors is None:
             self.factorize()
         diagonal = self.diagonal()
         if self.definite and np.all(self.pivot_values() > SMALL * diagonal):
             return Inertia(0, False)
-        return beside_zero(lambda shift: self.shifted(shift).negative())
+        return beside_zero(self.negative)
 
-    def negative(self) -> int:
-        """Number of negative eigenvalues of a symmetric matrix, including round-off."""
+    def negative(self, shift: float = 0.0) -> int:
+        """Number of negative eigenvalues of a symmetric matrix, including round-off, after the
+        diagonal has grown by ``shift`` times its absolute value."""
+        # If Cholesky fails, the matrix is eliminated block by block along the chain; blocks whose
+        # elimination lets entries grow are merged with the next.
+        if shift:
+            moved = self._replace(flat=self.flat.copy())
+            moved.flat[::self.ld] += shift * np.abs(self.diagonal())
+            return moved.negative()
         _, info = lapack.dpbtrf(as_lapack(self), lower=1)
         if info == 0:
             return 0
@@ -221,12 +220,6 @@ class BandMatrix(Band):
                 # earlier rows are eliminated: they are in P and do not couple to later ones
                 P = np.block([[P, E], [E.T, A]])
                 last = after
-
-    def shifted(self, shift: float) -> "BandMatrix":
-        """The matrix plus ``shift`` times the absolute diagonal."""
-        out = self._replace(flat=self.flat.copy())
-        out.flat[self.top::self.ld] += shift * np.abs(self.diagonal())
-        return out
 
     def _dense(self, i0, i1, j0, j1, scale):
         """Rows i0 to i1 and columns j0 to j1, scaled on both sides."""

@@ -29,16 +29,6 @@ _handlers: dict[int, Any] = {}
 _pending: list[int] = []
 
 
-def _note(number, frame):
-    _pending.append(number)
-
-
-def raise_pending() -> None:
-    """Call the handlers of signals that wait; that of Ctrl-C raises KeyboardInterrupt."""
-    if _pending and current_thread() is main_thread():
-        _call(_handlers)
-
-
 def _call(handlers):
     waiting = set(_pending)
     _pending.clear()
@@ -48,7 +38,7 @@ def _call(handlers):
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Let signals wait for :func:`raise_pending`, at the latest until the end."""
+    """Let signals wait for the next callback, :func:`owner`, at the latest until the end."""
     if current_thread() is not main_thread() or _handlers:
         yield
         return
@@ -56,7 +46,7 @@ def deferred() -> Iterator[None]:
         handler = signal.getsignal(number)
         if callable(handler):
             _handlers[number] = handler
-            signal.signal(number, _note)
+            signal.signal(number, lambda number, frame: _pending.append(number))
     try:
         yield
     finally:
@@ -80,7 +70,8 @@ def handle_of(thing: Any) -> int:
 
 def owner(handle: int) -> Any:
     """The object of a handle; raises the exception of an earlier callback of this kernel again."""
-    raise_pending()
+    if _pending and current_thread() is main_thread():
+        _call(_handlers)  # that of Ctrl-C raises KeyboardInterrupt
     if _raised and get_ident() in _raised:
         raise _raised[get_ident()]
     return _objects[handle]

@@ -51,11 +51,10 @@ class NotCompiled(Exception):
     """A user's function that Numba cannot compile."""
 
 
-#: Lines of files that are compiled, and names of others on which compiled code depends.
+#: Lines of files that are compiled.
 _MARKS = re.compile(rb"^\s*(@source|@primitive|@apart|import numba|from (numba|\.+source) |"
                     rb"from \.+core import (\([^)]*|[^(\n]*)"
                     rb"\b(source|primitive|apart|indices|[FI][123])\b)", re.MULTILINE)
-_ALSO = "loops.py", "packed.py"
 
 
 @cache
@@ -64,7 +63,7 @@ def compiled_files() -> dict[Path, bytes]:
     package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
     texts = {path: path.read_bytes() for path in sorted(package.rglob("*.py"))}
     return {path: text for path, text in texts.items()
-            if path.name in _ALSO or _MARKS.search(text)}
+            if path.name == "loops.py" or _MARKS.search(text)}
 
 
 @cache
@@ -148,22 +147,17 @@ def verified(place: Path, name: str) -> Iterator[None]:
     """Around work that uses the cached files of a function: removes those that have been damaged. A
     checksum lies beside each file, since Numba runs what it finds in it."""
     def files():
-        return place.glob(f"*.{name}-*.nb[ci]")
+        for path in place.glob(f"*.{name}-*.nb[ci]"):
+            yield (path, path.with_suffix(f"{path.suffix}-sum"),
+                   b"%08x" % zlib.crc32(path.read_bytes()))
 
-    def noted(path):
-        return path.with_suffix(f"{path.suffix}-sum")
-
-    for path in files():
-        if not noted(path).exists() or noted(path).read_bytes() != _sum(path):
+    for path, noted, checksum in files():
+        if not noted.exists() or noted.read_bytes() != checksum:
             logger.info("%s is damaged, and compiled again", path)
             path.unlink()
     yield
-    for path in files():
-        noted(path).write_bytes(_sum(path))
-
-
-def _sum(path):
-    return b"%08x" % zlib.crc32(path.read_bytes())
+    for _, noted, checksum in files():
+        noted.write_bytes(checksum)
 
 
 @contextmanager

@@ -11,16 +11,14 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from .types import Array
+from .types import Array, ArrayLike
 
 _T = TypeVar("_T")
 
@@ -389,10 +387,6 @@ def require_unmasked(name: str, value: Any) -> None:
            "replace them with numpy.ma.filled", name)
 
 
-#: Largest relative error of a derivative, compared with the difference quotient.
-SLOPE = 0.01
-
-
 def along(function: Callable[[float], Any]) -> list[Array]:
     """Values of a function at -1, 0 and 1, for :func:`require_slope`."""
     return [np.asarray(function(s)) for s in (-1.0, 0.0, 1.0)]
@@ -409,7 +403,7 @@ def require_slope(what: str, of: str, values: Sequence[Any] | Callable[[float], 
     off = np.abs(change - slope)
     if noise is None:
         noise = 1e-12 * np.max(np.abs(values[1]), initial=0.0)
-    if not np.max(off, initial=0.0) <= SLOPE * np.max(np.abs([change, slope])) + noise:  # or NaN
+    if not np.max(off, initial=0.0) <= 0.01 * np.max(np.abs([change, slope])) + noise:  # or NaN
         k = np.argmax(off)
         raise InputError(f"{what} is not the derivative of {of}: over a small step it gives "
                          f"{slope[k]:.6g}, but the change is {change[k]:.6g}{else_}")
@@ -505,7 +499,7 @@ def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
     return value
 
 
-@contextmanager
+@contextlib.contextmanager
 def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
     """Raise warnings of a category as errors, in one thread at a time."""
     with _FILTERS, warnings.catch_warnings():
@@ -513,7 +507,7 @@ def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
         yield
 
 
-@contextmanager
+@contextlib.contextmanager
 def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator[None]:
     """Convert any exception of the block to the error ``kind`` with a hint."""
     # ``what`` is formatted with ``of``. Errors of the package pass unchanged.
@@ -525,7 +519,7 @@ def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator
         raise kind(f"{what.format(*of)}: {type(error).__name__}: {error}; {hint}") from error
 
 
-@contextmanager
+@contextlib.contextmanager
 def retold(kinds: Any, message: str, *values: Any, error: type[AncfError] = InputError
            ) -> Iterator[None]:
     """As :func:`refuse` for errors of some kinds in the block, whose text is ``{error}``."""
@@ -665,7 +659,7 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     times = require_finite("times", times, (None,))
 
     def alone(some: Array) -> Array:
-        with suppress(Exception):  # a message for one call is made below
+        with contextlib.suppress(Exception):  # a message for one call is made below
             found = [function(t) for t in some.tolist()]
             if {*map(type, found)} <= {float, int, np.float64, np.ndarray}:
                 values = np.array(found)
@@ -678,7 +672,7 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     some = [0, n // 2, n - 1]
     if n <= FEW:
         return alone(times)
-    with suppress(Exception):  # the function does not accept arrays
+    with contextlib.suppress(Exception):  # the function does not accept arrays
         values = np.asarray(function(times), dtype=float)
         values = values if values.ndim == 1 else np.moveaxis(values, -1, 0)
         few = alone(times[some])

@@ -4,9 +4,8 @@ import functools
 import inspect
 import sys
 from collections.abc import Callable, Sequence
-from functools import lru_cache, wraps
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from skfem.assembly.form.form import Form
@@ -201,30 +200,24 @@ else:
             return value
 
 
-class ArrayKey:
-    """A hashable key of arrays, compared by shape, type and values."""
-
-    def __init__(self, *arrays: Any) -> None:
-        self.arrays = arrays
-        self._key = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
-
-    def __eq__(self, other):
-        return isinstance(other, ArrayKey) and self._key == other._key
-
-    def __hash__(self):
-        return hash(self._key)
+class _ArrayKey(NamedTuple):
+    shape: tuple[int, ...]
+    dtype: str
+    values: bytes
 
 
 def array_cache(maxsize: int) -> Callable[[Function], Function]:
     """``functools.lru_cache`` for functions of arrays; results must be read-only."""
     def decorate(function: Function) -> Any:
-        @lru_cache(maxsize)
+        @functools.lru_cache(maxsize)
         def of_keys(*keys: Any) -> Any:
-            return function(*(k.arrays[0] if isinstance(k, ArrayKey) else k for k in keys))
+            return function(*(np.ndarray(k.shape, k.dtype, k.values).copy()
+                              if isinstance(k, _ArrayKey) else k for k in keys))
 
-        @wraps(function)
+        @functools.wraps(function)
         def cached(*args: Any) -> Any:
-            return of_keys(*(ArrayKey(a) if isinstance(a, np.ndarray) else a for a in args))
+            return of_keys(*(_ArrayKey(a.shape, a.dtype.str, a.tobytes())
+                             if isinstance(a, np.ndarray) else a for a in args))
 
         return cached
 

@@ -5,7 +5,7 @@ therefore called by address."""
 
 import pickle
 from ctypes import CFUNCTYPE, c_double, c_int64, c_void_p, cast
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -20,8 +20,7 @@ from numba.extending import (intrinsic, lower_builtin, lower_getattr_generic, mo
 
 from .callbacks import FROM_PYTHON, deferred, kept as keeping, raise_kept
 from .code_cache import cannot_keep, can_keep, key, nothing_collected, verified
-from .source import APART, MADE, MARKED, PYTHON, apart, room, shaped
-from .packed import Packed, hints
+from .source import APART, MADE, MARKED, PYTHON, Packed, apart, hints, room, shaped
 
 
 # without "nnan" and "ninf", since strains that are not finite must be detected
@@ -149,27 +148,22 @@ def load_part(part: str) -> None:
     for function, one in APART.items():
         if one.part == part:
             load(function)
-            FROM_PYTHON[function] = _from_python(function)
+            FROM_PYTHON[function] = partial(_call_entry, function, [])
 
 
-def _from_python(function):
-    """A function that calls the :func:`entry` of another, with exceptions of callbacks."""
-    made: list[Any] = []
-
-    def call(tables, *args):
-        if not made:
-            made.append(entry(function, (tables, *args)))
-        words = Packed(tables)
-        with deferred():
-            found = made[0](words.address, *args)
-        raise_kept()
-        return found
-
-    return call
+def _call_entry(function, made, tables, *args):
+    """Call the :func:`entry` of a function, which is made once, with exceptions of callbacks."""
+    if not made:
+        made.append(entry(function, (tables, *args)))
+    words = Packed(tables)
+    with deferred():
+        found = made[0](words.address, *args)
+    raise_kept()
+    return found
 
 
 class Record(types.NamedTuple):
-    """A named tuple by the address of its :class:`~skfem_ancf.core.packed.Packed`. Fields are read
+    """A named tuple by the address of its :class:`~skfem_ancf.core.source.Packed`. Fields are read
     where they are used. Tuples of many arrays by value take Numba ten times as long, since it
     counts all references."""
 
@@ -229,7 +223,7 @@ def _array(context, builder, kind, data, shape):
 
 @cache
 def reader(kind: Any) -> Any:
-    """A compiled function from the address of a :class:`~skfem_ancf.core.packed.Packed` tuple."""
+    """A compiled function from the address of a :class:`~skfem_ancf.core.source.Packed` tuple."""
     made = Record(kind)
 
     @intrinsic
@@ -346,7 +340,10 @@ def entry(function: Any, args: Any) -> Any:
         for k in tuples:
             words = known.get(id(args[k]))
             if words is None or words.of is not args[k]:
-                words = _words(args[k], known)
+                known.pop(id(args[k]), None)
+                known[id(args[k])] = words = Packed(args[k])
+                if len(known) > 16:
+                    del known[next(iter(known))]
             numbers[k] = words.address
             alive += (words,)
         for k in flat:
@@ -359,19 +356,6 @@ def entry(function: Any, args: Any) -> Any:
 def _of_numbers(x):
     """True if a named tuple has numbers only."""
     return all(hint in SCALARS for hint in hints(type(x)))
-
-
-#: Number of tuples whose words are cached.
-LAST = 16
-
-
-def _words(x, known):
-    """A tuple that is not known, packed."""
-    known.pop(id(x), None)
-    known[id(x)] = found = Packed(x)
-    if len(known) > LAST:
-        del known[next(iter(known))]
-    return found
 
 
 def address(function: Any, hints: Any, name: str = "", kept: bool = True,

@@ -14,6 +14,9 @@ def column(x):
     return x
 
 
+everywhere = somewhere = column  # a condition is one truth value here
+
+
 # band matrices
 
 
@@ -417,14 +420,6 @@ def custom_distance(handle, obstacle, t, x, out):
 
 def log1p(x):
     return np.log1p(x)
-
-
-def everywhere(condition):
-    return condition
-
-
-def somewhere(condition):
-    return condition
 
 
 def where(condition, x, y):

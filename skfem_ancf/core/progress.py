@@ -5,15 +5,15 @@ from contextlib import AbstractContextManager, nullcontext
 from types import SimpleNamespace
 from typing import Any
 
-from .errors import InputError, MissingExtra, shown
+from .errors import MissingExtra, refuse
 
 NO_BAR = nullcontext(SimpleNamespace(update=lambda amount: None))
 
 
 def progress_bar(show: bool | None, total: float, desc: str) -> AbstractContextManager[Any]:
     """A bar with ``update(amount)``; ``show`` may be None for long work on a terminal."""
-    if show is not None and not isinstance(show, bool):
-        raise InputError(f"progress must be True, False or None, got {shown(show)}")
+    refuse(not isinstance(show, (bool, type(None))), "progress must be True, False or None, got "
+           "{!r}", show)
     if show is None and not (sys.stderr and sys.stderr.isatty()) or show is False:
         return NO_BAR
     try:

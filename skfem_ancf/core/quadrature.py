@@ -5,11 +5,10 @@ from math import comb, perm
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from .errors import InputError, refuse, require_finite, require_integer, shown
+from .errors import refuse, require_finite, require_integer
 from .immutable import read_only
-from .types import Array, Rule
+from .types import Array, ArrayLike, Rule
 
 #: Largest number of points.
 MAX_POINTS = 1000
@@ -47,8 +46,8 @@ def tensor(axis: Rule, section: Rule) -> Rule:
     # ``Basis(quadrature=(X, W))``.
     rules = []
     for name, rule in (("axis", axis), ("section", section)):
-        if not isinstance(rule, (tuple, list)) or len(rule) != 2:
-            raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")
+        refuse(not isinstance(rule, (tuple, list)) or len(rule) != 2, "{} must be a pair of points "
+               "and weights, got {!r}", name, rule)
         x = require_finite(f"the points of {name}", rule[0], (None,))
         rules.append((x, require_finite(f"the weights of {name}", rule[1], x.shape)))
     return product_rule(*rules)

@@ -31,7 +31,7 @@ ROUGH = 1e-8
 class Last:
     """The last factors of a matrix that is more than a band, and its groups of equations."""
 
-    factors: "Alone | Schur | NullSpace | None" = None
+    factors: "BandMatrix | Schur | NullSpace | None" = None
     _of: Any = None
 
     def blocks(self, rows: Array, columns: Array, m: int, n: int) -> list[Block]:
@@ -151,8 +151,9 @@ class LinearSolver:
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """x and multipliers for forces (N,) and constraint residuals (m,)."""
-        return self._factors.solve(residual * self._system.constraints.mask,
-                                   np.zeros(0) if phi is None else phi)
+        b, c = residual * self._system.constraints.mask, np.zeros(0) if phi is None else phi
+        found = self._factors
+        return (found.solve(b), c) if isinstance(found, BandMatrix) else found.solve(b, c)
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                    dm: Array) -> None:
@@ -186,13 +187,13 @@ class LinearSolver:
         """Sign of the determinant of the matrix of :meth:`inertia`, but of the unsymmetric one."""
         if isinstance(self._last.factors, NullSpace):
             return determinant_sign(self._last.factors.reduced())
-        if isinstance(self._last.factors, Alone):
-            return self._system.K.determinant_sign()
+        if isinstance(self._last.factors, BandMatrix):
+            return self._last.factors.determinant_sign()
         return -1 if self.inertia().negative % 2 else 1
 
     def keep_band(self) -> None:
         """Take the factors of the band for those of the whole."""
-        self._last.factors = Alone(self._system.K, self._system.symmetric)
+        self._last.factors = self._system.K
 
     def forget(self) -> None:
         """Discard all factors."""
@@ -208,21 +209,6 @@ class LinearSolver:
             return self._system.K.definite
         known = self._last.factors if self.condensed is None else self.condensed.ready
         return bool(known) and self._system.symmetric and self.inertia() == Inertia(0, False)
-
-
-class Alone:
-    """The factors of a band matrix K, of a system that may be more at another displacement."""
-
-    def __init__(self, K: BandMatrix, symmetric: bool) -> None:
-        self._K, self._symmetric = K, symmetric
-
-    def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
-        """Solve for a right-hand side b (n,); there are no multipliers."""
-        return self._K.solve(b), c
-
-    def inertia(self) -> Inertia:
-        """Inertia of the symmetric part of K."""
-        return (self._K if self._symmetric else self._K.symmetric_part()).inertia()
 
 
 class Schur:

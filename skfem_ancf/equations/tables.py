@@ -221,7 +221,7 @@ class Tables:
             rest.append(parts.view(float).reshape(4, -1, 2).transpose(0, 2, 1).reshape(8, -1))
             nodes.append(s.start + beam.nd * beam.mesh.t)
         high = max([beam.mesh.height for beam in system.beams], default=0.0)
-        if all(t.kind == CABLE and t.law.kind == LINEAR and t.rows.shape[1] == len(t.H[0])
+        if all(t.kind == CABLE and t.law.kind == LINEAR and t.pattern.ns == len(t.H[0])
                for t in body.packs) and all(beam.mesh.is_straight for beam in system.beams):
             for t in body.packs:
                 size = np.array([[2.0], [high]]) / t.H.reshape(len(t.H), 2, -1)

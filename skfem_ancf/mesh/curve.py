@@ -65,8 +65,6 @@ logger = logging.getLogger(__name__)
 STENCIL = np.arange(-3, 4)
 #: Relative coordinates in an element for curvatures, and beside a node for kinks.
 FINE, ASIDE = np.arange(32) / 32.0, np.array([-1e-3, 1e-3, -2.5e-4, 2.5e-4])
-#: Relative parameters at which the complex step is compared with differences.
-TRIED = np.linspace(0.0137, 0.991, 24)
 #: Smallest angle of a kink that is refused; fine polygons have smaller ones.
 KINK = 1e-2
 
@@ -122,8 +120,8 @@ class Curve:
 
     def lengths(self, a: Array, b: Array) -> Array:
         """Arc lengths from parameters ``a`` to ``b``, all of shape (n,)."""
-        at, w = _gauss_points(a, b - a)
-        d, = _each(self.rate, at)
+        x, w = gauss(12)
+        d, = _each(self.rate, a[:, None] + (b - a)[:, None] * x)
         return np.hypot(*d) @ w * (b - a)
 
     def elements(self, s: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -131,10 +129,10 @@ class Curve:
         """
         a, step = s[:-1], np.diff(s)
         beside = s[1:-1] + ASIDE[:, None] * np.minimum(step[:-1], step[1:])
-        gauss, w = _gauss_points(a, step)
+        x, w = gauss(12)
         fine = np.append(a[:, None] + step[:, None] * FINE, s[-1])
         p, p_beside = _each(self, s, beside)
-        here, d_gauss, d_fine = _each(self._moving, s, gauss, fine)
+        here, d_gauss, d_fine = _each(self._moving, s, a[:, None] + step[:, None] * x, fine)
         lengths = np.hypot(*d_gauss) @ w * step
         gap = np.hypot(*(d_gauss @ w * step - np.diff(p))) / lengths
         refuse_any(~(gap <= 0.02), "r jumps, or its derivative misses it by {:.6g}, between s = "
@@ -178,7 +176,7 @@ def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[
     """Derivative of ``r`` on [s0, s1] by the complex step, or else by sixth-order differences."""
     differences, complex_step = partial(_differences, r, s0, s1), partial(_complex_step, r)
     try:
-        probe = s0 + (s1 - s0) * TRIED
+        probe = s0 + (s1 - s0) * np.linspace(0.0137, 0.991, 24)
         with warnings_as_errors():  # among them: the imaginary part is discarded
             exact, near = complex_step(probe), differences(probe)
         size = np.abs(near)
@@ -203,14 +201,7 @@ def _stencil(s, s0, s1):
     d = 1e-3 * (s1 - s0)
     c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays inside
     x = (s - c) / d
-    weights = np.zeros((len(STENCIL), len(x)))
     # the inverse has the coefficients of Lagrange's polynomials, those of the highest powers first
-    slopes = np.array([np.polyder(c) for c in np.linalg.inv(np.vander(STENCIL)).T])
-    for coefficients in slopes.T:
-        weights = weights * x + coefficients[:, None]
+    weights = np.array([np.polyval(np.polyder(one), x)
+                        for one in np.linalg.inv(np.vander(STENCIL)).T])
     return c + STENCIL[:, None] * d, weights, d
-
-
-def _gauss_points(a, step):
-    x, w = gauss(12)
-    return a[:, None] + step[:, None] * x, w

@@ -19,10 +19,6 @@ from .frame_graph import FrameGraph
 
 logger = logging.getLogger(__name__)
 
-#: Entities that are not straight lines, which are refused.
-CURVES = ("ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
-
-
 #: Units of length in which drawings can be read.
 UNITS = "m", "mm", "cm", "dm", "km", "in", "ft", "yd"
 
@@ -31,7 +27,7 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
     """Lines and points of a drawing as a meshio mesh, with a cell set for each layer."""
     import meshio
 
-    ezdxf = require_module("ezdxf", "dxf")
+    ezdxf, units = require_module("ezdxf", "dxf"), require_module("ezdxf.units", "dxf")
     with retold((OSError, ezdxf.DXFError), "{} cannot be read as a drawing: {error}", path,
                 error=FileError):
         drawing = ezdxf.readfile(path)
@@ -47,31 +43,25 @@ def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
                 lines.append(entity.dxf.layer)
             elif kind == "POINT":
                 points.append((entity.dxf.layer, part.dxf.location.xyz))
-            refuse(kind in CURVES, "{} has {} in the layer {!r}: explode blocks, draw curves as "
-                   "polylines", path, kind, entity.dxf.layer, error=MeshError)
+            refuse(kind in ("ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT"), "{} has {} in the "
+                   "layer {!r}: explode blocks, draw curves as polylines", path, kind,
+                   entity.dxf.layer, error=MeshError)
     refuse(not lines, "{} has no lines and no polylines", path, error=MeshError)
     at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
-    at = at * _scale(drawing.units, unit, path)
+    stated = units.decode(drawing.units) if drawing.units else None  # $INSUNITS
+    if unit is None:
+        logger.info("%s is taken as drawn, %s; unit='m' converts its coordinates to metres", path,
+                    f"in {stated}" if stated else "in a unit that it does not state")
+    else:
+        target = getattr(units, require_option("unit of length", unit, UNITS).upper())
+        refuse(stated is None, "{} does not state its unit ($INSUNITS is {}): leave out unit={!r}",
+               path, drawing.units, unit)
+        at = at * units.conversion_factor(drawing.units, target)
     ends, alone = np.split(number.ravel(), [2 * len(lines)])
     layers, of = np.array(lines), np.array([name for name, _ in points])
     return meshio.Mesh(at, [("line", ends.reshape(-1, 2)), ("vertex", alone[:, None])], cell_sets={
         name: [np.flatnonzero(layers == name), np.flatnonzero(of == name)]
         for name in dict.fromkeys([*lines, *of.tolist()])})
-
-
-def _scale(code, unit, path):
-    """The factor from the unit of a drawing, a number of $INSUNITS, to another one."""
-    from ezdxf import units
-
-    stated = units.decode(code) if code else None
-    if unit is None:
-        logger.info("%s is taken as drawn, %s; unit='m' converts its coordinates to metres", path,
-                    f"in {stated}" if stated else "in a unit that it does not state")
-        return 1.0
-    target = getattr(units, require_option("unit of length", unit, UNITS).upper())
-    refuse(stated is None, "{} does not state its unit ($INSUNITS is {}): leave out unit={!r}",
-           path, code, unit)
-    return units.conversion_factor(code, target)
 
 
 #: Line cells of meshio: the ends first, then interior points in order.
@@ -126,21 +116,18 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
 def _mesh_of(mesh, unit):
     import meshio
 
-    if isinstance(mesh, (str, Path)):
-        path = require_path("mesh", mesh)
-        if path.suffix.lower() == ".dxf":
-            return mesh_of_dxf(path, unit)
+    path = require_path("mesh", mesh) if isinstance(mesh, (str, Path)) else None
+    if path is not None and path.suffix.lower() == ".dxf":
+        return mesh_of_dxf(path, unit)
+    if path is not None:
         with retold((Exception, SystemExit),  # meshio exits on an unknown format
                     "{} cannot be read as a mesh: {error}", path, error=FileError):
             mesh = meshio.read(path)
-        if path.suffix.lower() == ".inp":
-            _require_sets_of_abaqus(path)
     refuse(unit is not None, "unit={!r} is for drawings in DXF, which state theirs", unit)
-    return require_kind("mesh", mesh, meshio.Mesh, " of meshio or the name of a file")
-
-
-def _require_sets_of_abaqus(path):
-    """Raise MeshError for element sets of an Abaqus file that meshio 5 misreads."""
+    require_kind("mesh", mesh, meshio.Mesh, " of meshio or the name of a file")
+    if path is None or path.suffix.lower() != ".inp":
+        return mesh
+    # element sets of an Abaqus file that meshio 5 misreads
     blocks, sets, keyword = [], [], ""
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         if line.startswith("*"):
@@ -159,6 +146,7 @@ def _require_sets_of_abaqus(path):
     refuse(again or blocks[:len(named)] != named, "{}: write *ELSET with the numbers of all its "
            "elements: {}", path, f"{again[0]!r} is there twice" if again else
            "an *ELEMENT has no set before one that has", error=MeshError)
+    return mesh
 
 
 def _ends_first(points, cell):
@@ -175,8 +163,20 @@ def _ends_first(points, cell):
 
 def _names(mesh, blocks, used, wanted):
     """Lines and nodes by name, and by name a point that is not an end of a line."""
-    sets = {name: parts for name, parts in mesh.cell_sets.items()
-            if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
+    sets = {name: parts for name, parts in mesh.cell_sets.items() if not name.startswith("gmsh:")}
+    # or stored as numbers: Gmsh physical groups, or names in meshio cell data
+    names = {int(number): name for name, (number, _) in mesh.field_data.items()}
+    for key, parts in () if sets else mesh.cell_data.items():
+        known: Any = ()
+        texts = key.split("-")
+        numbers = np.unique(np.concatenate([np.ravel(part) for part in parts]))
+        if key == "gmsh:physical":
+            known = [(int(k), names.get(int(k), str(int(k)))) for k in numbers if k]
+        elif set(wanted) & set(texts) and numbers.dtype.kind in "iu" and (
+                -1 <= numbers[0] and numbers[-1] < len(texts)):
+            known = enumerate(texts)
+        for number, name in known:
+            sets[name] = [np.flatnonzero(np.ravel(part) == number) for part in parts]
     groups, found = {}, dict[str, list[Any]]()
     for name, parts in sets.items():
         refuse(len(parts) > len(mesh.cells), "the cell set {!r} has {} parts, the mesh {} blocks",
@@ -213,24 +213,6 @@ def _entries(name, part, n):
     refuse(len(out) and (out.dtype.kind not in "iu" or out.min() < 0 or out.max() >= n), "the set "
            "{!r} must hold numbers from 0 to {}, got {!r}", name, n - 1, part, error=MeshError)
     return out.astype(np.int64)
-
-
-def _numbered(mesh, wanted):
-    """Cell sets stored as numbers: Gmsh physical groups, or names in meshio cell data."""
-    sets = {}
-    names = {int(number): name for name, (number, _) in mesh.field_data.items()}
-    for key, parts in mesh.cell_data.items():
-        found = np.unique(np.concatenate([np.ravel(part) for part in parts]))
-        if key == "gmsh:physical":
-            known = {int(k): names.get(int(k), str(int(k))) for k in found if k}
-        elif set(wanted) & set(key.split("-")) and found.dtype.kind in "iu" and (
-                -1 <= found[0] and found[-1] < len(key.split("-"))):
-            known = dict(enumerate(key.split("-")))
-        else:
-            continue
-        for number, name in known.items():
-            sets[name] = [np.flatnonzero(np.ravel(part) == number) for part in parts]
-    return sets
 
 
 def _polynomial(points, s):

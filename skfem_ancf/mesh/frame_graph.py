@@ -6,8 +6,6 @@ from typing import Any, cast
 
 import numpy as np
 import scipy
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..core import (Array, InputError, MeshError, ModelWarning, ask_field, refuse, refuse_any,
                     require_finite, require_integer, require_label, require_moderate,
@@ -21,9 +19,10 @@ from .mapping import heights_of
 # the mesh of the lines of a frame: several chains of elements
 
 
-def chain_of(s: Array) -> Array:
-    """Chain number of parameters (n,), which run from 2 k to 2 k + 1 on chain k."""
-    return np.floor(0.5 * s).astype(int)
+def chains_of(s: Array) -> tuple[Array, Array]:
+    """Chain numbers of parameters (n,), from 2 k to 2 k + 1 on chain k, and those on the chains."""
+    chain = np.floor(0.5 * s).astype(int)
+    return chain, s - 2.0 * chain
 
 
 class MeshLines(MeshBeam):
@@ -34,8 +33,7 @@ class MeshLines(MeshBeam):
     @property
     def parameters(self) -> Array:
         """Parameter of each node on its local chain, from 0 to 1, shape (nvertices,)."""
-        s = cast("Array", self.s)
-        return s - 2.0 * chain_of(s)
+        return chains_of(cast("Array", self.s))[1]
 
     def _heights_of(self, height):
         return heights_of_chains(height, self.s, self.t)
@@ -52,8 +50,7 @@ class Heights:
         return ", ".join(map(shown, self.given))
 
     def __call__(self, s: Array) -> Array:
-        chain, out = chain_of(s), np.empty(len(s))
-        local = s - 2.0 * chain
+        (chain, local), out = chains_of(s), np.empty(len(s))
         if len(self.given) == 1:
             return _values(self.given[0], local)
         for k in np.unique(chain).tolist():
@@ -69,8 +66,7 @@ def _values(height, s):
 def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
     """As :func:`~.mapping.heights_of`, for a number, a function, or a list for the chains."""
-    chain = chain_of(s)
-    local = s - 2.0 * chain
+    chain, local = chains_of(s)
     if not isinstance(height, list):
         largest, heights, _ = heights_of(height, local, t)
         return largest, heights, None if heights is None else Heights([height])
@@ -95,9 +91,9 @@ class Axes:
         self.arcs, self.start, self.chord = dict(arcs), start, chord
 
     def _parts(self, s):
-        chain = chain_of(s)
-        return chain, s - 2 * chain, [(arc, chain == k) for k, arc in self.arcs.items()
-                                      if np.any(chain == k)]
+        chain, local = chains_of(s)
+        return chain, local, [(arc, chain == k) for k, arc in self.arcs.items()
+                              if np.any(chain == k)]
 
     def nodes(self, s: Array) -> tuple[Array, Array]:
         chain, s, parts = self._parts(s)
@@ -166,27 +162,13 @@ class FrameGraph:
         refuse_any(~np.isin(np.arange(n), self.lines), "the point {k} at {:.9g} is in no line: "
                    "remove it, or join it to another point", self.points, error=MeshError)
         self._merge(tol)
-        self._require_lines()
-        self.beams = tuple(self.groups) if beams is None else tuple(beams)
-        taken = np.full(m, -1)  # the number of the group of each line
-        for name in self.beams:
-            some = self.groups[name]
-            refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: groups= names "
-                       "the sets of a mesh that are beams", some,
-                       np.array(self.beams)[taken[some]], name)
-            taken[some] = self.beams.index(name)
-            refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
-                   "shorter than tol = {:.3g}", name, self.tol, error=MeshError)
-
-    def _require_lines(self):
         key = np.sort(self.lines[:, self.distinct], axis=0)
         _, first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)
         first = first[np.ravel(which)]
-        for i, j in zip(self.distinct[first], self.distinct):
-            if i != j and not {int(i), int(j)} & set(self.curves):
-                raise MeshError(f"lines {i} and {j} are the same: both join the points "
-                                f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
-                                "them a curve")
+        i, j = pair = np.array([self.distinct[first], self.distinct])
+        refuse_any((i != j) & ~np.isin(pair, list(self.curves)).any(axis=0), "lines {} and {} are "
+                   "the same: both join the points {}; remove one, or give one of them a curve",
+                   i, j, np.sort(self.lines[:, j], axis=0), error=MeshError)
         # warn of nodes on a straight line between its ends: lines are joined at their
         # ends only
         some = np.setdiff1d(self.distinct, list(self.curves))
@@ -203,9 +185,19 @@ class FrameGraph:
         if np.any(on):
             node, line = node[on][0], some[k[on][0]]
             more = f", and {np.sum(on) - 1} other(s) likewise" if np.sum(on) > 1 else ""
-            warn(f"the node {node} at {_at(self.points[:, node])} is on line {line} between its "
-                 f"ends{more}, and not joined to it: divide the line there if it should be",
-                 ModelWarning)
+            at = "({:.9g}, {:.9g})".format(*self.points[:, node])
+            warn(f"the node {node} at {at} is on line {line} between its ends{more}, and not "
+                 "joined to it: divide the line there if it should be", ModelWarning)
+        self.beams = tuple(self.groups) if beams is None else tuple(beams)
+        taken = np.full(m, -1)  # the number of the group of each line
+        for name in self.beams:
+            some = self.groups[name]
+            refuse_any(taken[some] >= 0, "line {} is in the groups {!r} and {!r}: groups= names "
+                       "the sets of a mesh that are beams", some,
+                       np.array(self.beams)[taken[some]], name)
+            taken[some] = self.beams.index(name)
+            refuse(not np.any(np.isin(some, self.distinct)), "all lines of the group {!r} are "
+                   "shorter than tol = {:.3g}", name, self.tol, error=MeshError)
 
     def _merge(self, tol):
         n, places = self.points.shape[1], self.points
@@ -218,12 +210,11 @@ class FrameGraph:
         pairs = pairs[np.lexsort(pairs.T[::-1])]
         apart = np.hypot(*(places[:, pairs[:, 0]] - places[:, pairs[:, 1]]))
         one = (apart <= self.tol * (1.0 + 1e-9)) & (self.tol > 0.0)
-        for (i, j), d in zip(pairs[~one], apart[~one]):
-            if d <= NEAR * self.size:
-                raise MeshError(f"the points {i} and {j} are both at {_at(places[:, i])}: give "
-                                "tol= to make them one")
-        joined = sparse.coo_array((np.ones(int(one.sum())), pairs[one].T), (n, n))
-        _, label = connected_components(joined, directed=False)
+        refuse_any(apart[~one] <= NEAR * self.size, "the points {} and {} are both at {:.9g}: give "
+                   "tol= to make them one", *pairs[~one].T, places[:, pairs[~one, 0]],
+                   error=MeshError)
+        joined = scipy.sparse.coo_array((np.ones(int(one.sum())), pairs[one].T), (n, n))
+        _, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
         _, first = np.unique(label, return_index=True)
         self.same = first[label]
         self.points, self.lines = places[:, self.same], self.same[self.given]
@@ -356,10 +347,6 @@ def _named(kind, what, given, n):
         refuse_any((found < 0) | (found >= n), "{!r} holds the number {}: the {} are numbered 0 to "
                    "{}", name, found, what, n - 1, error=MeshError)
     return out
-
-
-def _at(x):
-    return f"({x[0]:.9g}, {x[1]:.9g})"
 
 
 def _warn_of(pairs, apart, what):

@@ -21,9 +21,6 @@ SECTIONS = ("linear", "cubic", "quintic", "septic",
 #: Axial coordinates of the heights of an element, and points between at which the fit is checked.
 PLACES, BETWEEN = np.arange(4) / 3.0, (1.0 + 2.0 * np.arange(3)) / 6.0
 
-#: Largest relative error of the fit.
-FITS = 0.02
-
 
 def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
     return factor * np.asarray(function(s))
@@ -43,14 +40,9 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
                found.ravel(), at.ravel(), error=MeshError)
     heights, between = found[:4].copy(), found[4:]
     gap = np.max(np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between, axis=0)
-    refuse_any(gap > FITS, "the height in element {k}, from {:.6g} to {:.6g}, differs from a cubic "
+    refuse_any(gap > 0.02, "the height in element {k}, from {:.6g} to {:.6g}, differs from a cubic "
                "by {:.1%}: use more elements, with a node at a kink", a, b, gap, error=MeshError)
     return float(np.max(heights)), heights, height
-
-
-def powers(heights: Array) -> Array:
-    """Coefficients of 1, xi, xi^2, xi^3 from heights; both of shape (4, nelements)."""
-    return np.linalg.solve(np.vander(PLACES, increasing=True), heights)
 
 
 def halved(heights: Array, marked: Array) -> Array:
@@ -136,7 +128,8 @@ class MappingBeam(Mapping):
         #: Degree of the height in xi: 0 if it is constant.
         self.height_degree = 0
         if mesh.heights is not None:
-            self.heights = c = powers(mesh.heights) / mesh.height
+            self.heights = c = np.linalg.solve(
+                np.vander(PLACES, increasing=True), mesh.heights) / mesh.height
             c[np.abs(c) <= NOTHING] = 0.0  # for a linear height
             self.height_degree = int(np.max(np.nonzero(np.any(c, axis=1))))
 

@@ -7,10 +7,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy import ndarray
-from skfem.element import Element
+from skfem import Element, MeshQuad
 from skfem.generic_utils import OrientedBoundary
-from skfem.mesh import MeshQuad
 
 from ..core import (Array, ArrayLike, FileError, Immutable, InputError, MeshError, StrPath, archive,
                     cached_property, is_builtin, picklable, refuse, refuse_any, require_finite,
@@ -88,14 +86,14 @@ class MeshBeam(NumberedMesh):
 
     elem: type[Element] = ElementBeamP1
     height: float = None  # type: ignore[assignment]
-    p_X: ndarray = None  # type: ignore[assignment]
-    p_Y: ndarray = None  # type: ignore[assignment]
-    lengths: ndarray = None  # type: ignore[assignment]
-    s: ndarray | None = None
+    p_X: np.ndarray = None  # type: ignore[assignment]
+    p_Y: np.ndarray = None  # type: ignore[assignment]
+    lengths: np.ndarray = None  # type: ignore[assignment]
+    s: np.ndarray | None = None
     curve: Curve | None = None
-    p_XY: ndarray | None = None
+    p_XY: np.ndarray | None = None
     sections: str = "linear"
-    heights: ndarray | None = None
+    heights: np.ndarray | None = None
     taper: Callable[[Array], ArrayLike] | None = None
     #: Name of the class in files.
     kind = "beam"
@@ -132,10 +130,9 @@ class MeshBeam(NumberedMesh):
         x = require_finite("x", x, (None,), "np.linspace(0, length, elements + 1)")
         origin = require_finite("origin", origin, (2,))
         angle = _radians(angle)
-        _require_nodes("x", x)
         e1 = np.array([np.cos(angle), np.sin(angle)])
         p = origin[:, None] + e1[:, None] * x
-        t = _chain(len(x))
+        t = _chain("x", x)
         return cls._from_nodes(p, t, e1[:, None], x[1:] - x[:-1], heights_of(height, x, t),
                                x.copy())
 
@@ -171,14 +168,13 @@ class MeshBeam(NumberedMesh):
         True
         """
         s = require_finite("s", s, (None,))
-        _require_nodes("s", s)
+        t = _chain("s", s)
         what = "of parameters (n,) that returns positions (2, n)"
         require_function("r", r, what)
         if dr is None:
             dr = derivative_of(r, s[0], s[-1])
         curve = Curve(r, require_function("dr", dr, what), (s[0], s[-1]))
         p, tangent, lengths, turning, bent = curve.elements(s)
-        t = _chain(len(s))
         largest, heights, taper = heights_of(height, s, t)
         # the curvature of each sixteenth of an element times half the height there
         h = (largest + 0.0 * lengths if heights is None else np.max(heights, axis=0)).repeat(16)
@@ -399,12 +395,11 @@ class MeshBeam(NumberedMesh):
             return False
         # the round-off of the nodes' positions is no difference in length
         noise = 8 * EPS * np.abs(self.doflocs).max()
-        least, most = _ends(self.lengths)
-        turn = np.abs(self.p_X - self.p_X[:, :1]).max()
-        if not (most - least <= 1e-13 * most + noise and turn <= 1e-12 + noise / least):
+        L, turn = self.lengths, np.abs(self.p_X - self.p_X[:, :1]).max()
+        if np.ptp(L) > 1e-13 * L.max() + noise or turn > 1e-12 + noise / L.min():
             return False
-        least, most = (0.0, 0.0) if self.is_chain else _ends(self.chain_lengths)
-        return bool(most - least <= 1e-12 * most)
+        chains = self.chain_lengths
+        return self.is_chain or bool(np.ptp(chains) <= 1e-12 * chains.max())
 
     @property
     def is_chain(self) -> bool:
@@ -711,19 +706,13 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     return min(total, max(longest, float(np.hypot(*(high - low)))))
 
 
-def _ends(values):
-    return values.min(), values.max()
-
-
-def _chain(n):
-    nodes = np.arange(n, dtype=np.int32)
-    return np.array([nodes[:-1], nodes[1:]])
-
-
-def _require_nodes(name, x):
+def _chain(name, x):
+    """Left and right nodes of elements between increasing parameters x."""
     refuse(len(x) < 2, "a beam needs at least two nodes, got {}", len(x), error=MeshError)
     refuse_any(x[1:] <= x[:-1], "{} must increase along the axis: element {k} from {:.9g} to "
                "{:.9g} has no length", name, x[:-1], x[1:], error=MeshError)
+    nodes = np.arange(len(x), dtype=np.int32)
+    return np.array([nodes[:-1], nodes[1:]])
 
 
 def _radians(angle):

@@ -6,9 +6,8 @@ from types import MappingProxyType
 from typing import Any, NoReturn
 
 import numpy as np
-from skfem.element import ElementH1
+from skfem import ElementH1, Mesh2D
 from skfem.generic_utils import OrientedBoundary
-from skfem.mesh import Mesh2D
 from skfem.refdom import RefLine, RefQuad, Refdom
 
 from ..core import (Array, ArrayLike, Immutable, MeshError, NearMisses, read_only, refuse,
@@ -198,7 +197,20 @@ def halved(mesh: Any, ix: Array) -> Any:
     elif mesh.heights is not None:
         fields["heights"] = halved_heights(mesh.heights, marked)
     m = replace(mesh, lengths=lengths, **fields)
-    m._boundaries = _refined_names(mesh, m, first, marked, node)
+    if mesh._boundaries is not None:
+        # of each facet the first child, and whether there is another behind it
+        n, children = m.p.shape[1], np.append(marked, marked)
+        start = np.concatenate([node, n + first, n + m.nelements + first])
+        two, m._boundaries = np.append(np.zeros(len(node), dtype=bool), children), {}
+        for name, facets in mesh._boundaries.items():
+            f = np.asarray(facets)
+            source = np.repeat(np.arange(len(f)), 1 + two[f])
+            found = start[f[source]] + np.append(False, source[1:] == source[:-1])[:len(source)]
+            order = np.argsort(found, kind="stable")
+            m._boundaries[name] = found[order].astype(np.int32)
+            if getattr(facets, "ori", None) is not None:
+                m._boundaries[name] = OrientedBoundary(
+                    m._boundaries[name], np.asarray(facets.ori)[source][order])
     if mesh._subdomains is not None:
         m._subdomains = {name: np.nonzero(np.isin(parent, e))[0].astype(np.int32)
                          for name, e in mesh._subdomains.items()}
@@ -239,24 +251,3 @@ def _midpoints(mesh, ix):
     return {**out, "doflocs": p, "p_X": tangent, "p_Y": np.array([-tangent[1], tangent[0]]),
             "p_XY": mesh.curve.turning(out["s"]),
             "lengths": (mesh.curve.lengths(a, out["s"]), mesh.curve.lengths(out["s"], b))}
-
-
-def _refined_names(mesh, m, first, marked, node):
-    """Boundaries of the refined mesh ``m``."""
-    tags = mesh._boundaries
-    if tags is None:
-        return None
-    # of each facet the first child, and whether there is another behind it
-    n, children = m.p.shape[1], np.append(marked, marked)
-    start = np.concatenate([node, n + first, n + m.nelements + first])
-    two = np.append(np.zeros(len(node), dtype=bool), children)
-    out = {}
-    for name, facets in tags.items():
-        f = np.asarray(facets)
-        source = np.repeat(np.arange(len(f)), 1 + two[f])
-        new = start[f[source]] + np.append(False, source[1:] == source[:-1])[:len(source)]
-        order = np.argsort(new, kind="stable")
-        out[name] = new[order].astype(np.int32)
-        if getattr(facets, "ori", None) is not None:
-            out[name] = OrientedBoundary(out[name], np.asarray(facets.ori)[source][order])
-    return out

@@ -128,9 +128,8 @@ class Finder:
                 h = self.mesh.height if self.mesh.heights is None else (
                     self.mapping.height(xi[:, None], e)[0][:, 0])
                 X = np.array([xi, 0.5 + across / h])
-                outside = np.maximum(*np.abs(X - 0.5)) - 0.5
-                outside[outside < noise] = 0.0
-                return e, np.minimum(np.maximum(X, 0.0), 1.0), outside, np.zeros(n, dtype=bool)
+                return (e, np.minimum(np.maximum(X, 0.0), 1.0), self._outside(X, noise),
+                        np.zeros(n, dtype=bool))
             if chain is not None or not self.is_chain:
                 return self._best(x, noise, *self._pairs(x, chain))
             found = self._best(x, noise, np.arange(n), self._tree.query(x.T)[1] // SAMPLES)
@@ -200,15 +199,6 @@ class Finder:
         """Distance of reference points (2, n) of elements (n,) from the axis, shape (n,)."""
         return np.abs(X[1] - 0.5) * np.ravel(self.mapping.inverse.height(e, X[0][:, None]))
 
-    def chains_at(self, x: Array) -> list[tuple[float, int]]:
-        """Chains that contain a point (2, 1), and the distances of their axes from it."""
-        found = []
-        for chain in range(int(self.mesh.chains[-1]) + 1):
-            e, X, outside, _ = self.find(x, chain)
-            if outside[0] == 0.0:
-                found.append((float(self.from_axis(e, X)[0]), chain))
-        return found
-
     @cached_property
     def _circles(self):
         """Centres (2, nelements) and radii (nelements,) of bounding circles."""
@@ -223,11 +213,11 @@ class Finder:
         return out
 
     @cached_property
-    def box(self) -> tuple[float, float, float, float]:
-        """A bounding box of the body: least and largest x, least and largest y."""
+    def box(self) -> tuple[Array, Array]:
+        """Least and largest coordinates of a bounding box of the body, (2, 1) each."""
         middle, radius = self._circles
-        (x0, y0), (x1, y1) = np.min(middle - radius, axis=1), np.max(middle + radius, axis=1)
-        return float(x0), float(x1), float(y0), float(y1)
+        return ((middle - radius).min(axis=1, keepdims=True),
+                (middle + radius).max(axis=1, keepdims=True))
 
     @cached_property
     def _line(self):

@@ -7,10 +7,9 @@ many arrays in one loop, whose addresses it compares."""
 
 import numpy as np
 
-from ...core import F1, F2, I1, I2, apart, room, shaped, source
+from ...core import F1, F2, F3, I1, I2, apart, room, shaped, source
 from .compiled import W, CompiledTables
-from .increments import AT_START, evaluate_increment
-from .tables import HISTORY, LINEAR, SECTION, conserve, law_evaluate
+from .tables import HISTORY, LINEAR, SECTION, conserve, evaluate_history, law_evaluate
 
 
 @source
@@ -44,23 +43,6 @@ def multiply(C, X):
         for i in range(0, len(x), len(c)):
             for e in range(len(c)):
                 x[i + e] *= c[e]
-
-
-@source
-def add_to_nodes(t, first, F, f):
-    """Add the forces of elements, scaled."""
-    m, last, at = len(F), min(t.width, len(t.start) - first), t.start[first:]
-    if len(t.D) > 0:
-        multiply(block(t.D, first), F)
-    for k in range(m):
-        x, v = F[k], f[2 * k + 2:]
-        for e in range(last):
-            v[np.uint64(at[e])] += x[e]
-            v[np.uint64(at[e] + 1)] += x[W + e]
-    x = F[m // 2]
-    for e in range(last):
-        f[np.uint64(at[e])] -= x[e]
-        f[np.uint64(at[e] + 1)] -= x[W + e]
 
 
 @source
@@ -246,19 +228,10 @@ def from_points(t, first, S, T):
         multiply(block(t.reach, first), T)
 
 
-@source
-def stresses(t, first, E, change, T):
-    """Weighted stresses of strains E."""
-    # With a ``change`` about E, their work on it is the change of the energy.
-    if t.law.kind == LINEAR:
-        times(t.pattern.pairs, block(t.H, first), E, T)
-    else:
-        law_stresses(t, first, E, change, T)
-
-
 @apart("laws", CompiledTables, int, F2, F2, F2)
 def law_stresses(t, first, E, change, T):
-    """:func:`stresses` of a nonlinear law."""
+    """Weighted stresses of strains E by a nonlinear law."""
+    # With a ``change`` about E, their work on it is the change of the energy.
     if t.law.kind == HISTORY:
         mean_with_history(t, first, E, change, T)
         return
@@ -384,7 +357,18 @@ def add_forces_of(t, first, X, T, U, B, F, f):
         add_own(block(t.own, first), t.used, len(F), B, F, 1)
     if len(U) > 0 and len(t.K) > 0:
         add_constant(t.coupled, block(t.K, first), block(t.Z, first), U, F)
-    add_to_nodes(t, first, F, f)
+    m, last, at = len(F), min(t.width, len(t.start) - first), t.start[first:]
+    if len(t.D) > 0:
+        multiply(block(t.D, first), F)
+    for k in range(m):
+        x, v = F[k], f[2 * k + 2:]
+        for e in range(last):
+            v[np.uint64(at[e])] += x[e]
+            v[np.uint64(at[e] + 1)] += x[W + e]
+    x = F[m // 2]
+    for e in range(last):
+        f[np.uint64(at[e])] -= x[e]
+        f[np.uint64(at[e] + 1)] -= x[W + e]
 
 
 @apart("StrainTables", I2, F2, F2, F2, F2)
@@ -530,13 +514,21 @@ def place(i, m):
     return (m // 2, a, -1.0) if k == 0 else (k - 1, a, 1.0)
 
 
-@apart("StrainTables", I1, int, int, int, F2, F2, F1)
-def add_to_band(start, first, ld, m, K, Z, A):
-    """Add tangents to a lower half."""
-    last = min(W, len(start) - first)
-    at = np.empty(W, np.uint64)
+@apart("StrainTables", CompiledTables, int, F2, F2, int, int, F1)
+def add_matrices(t, first, w, z, constant, ld, A):
+    """Add the matrices of coefficients to a lower half."""
+    m, n = t.G.shape[1], t.width
+    K, Z = room((m * (m + 1) // 2, 3 * n)), room((m * (m - 1) // 2, n))
+    products(t, first, w, z, K, Z)
+    if constant > 0 and len(t.K) > 0:
+        add(1.0, block(t.K, first), K)
+        add(1.0, block(t.Z, first), Z)
+    if len(t.D) > 0:
+        scale_products(block(t.D, first), K, 1)
+        scale_products(block(t.D, first), Z, 0)
+    last, at = min(W, len(t.start) - first), np.empty(W, np.uint64)
     for e in range(last):
-        at[e] = start[first + e] * ld
+        at[e] = t.start[first + e] * ld
     for j in range(2 * m + 2):
         l, b, sj = place(j, m)
         for i in range(j, 2 * m + 2):
@@ -552,16 +544,57 @@ def add_to_band(start, first, ld, m, K, Z, A):
                     A[at[e] + p] += sign * x[e] + c * y[e]
 
 
-@apart("StrainTables", CompiledTables, int, F2, F2, int, int, F1)
-def add_matrices(t, first, w, z, constant, ld, A):
-    """Add the matrices of coefficients to a lower half."""
-    m, n = t.G.shape[1], t.width
-    K, Z = room((m * (m + 1) // 2, 3 * n)), room((m * (m - 1) // 2, n))
-    products(t, first, w, z, K, Z)
-    if constant > 0 and len(t.K) > 0:
-        add(1.0, block(t.K, first), K)
-        add(1.0, block(t.Z, first), Z)
-    if len(t.D) > 0:
-        scale_products(block(t.D, first), K, 1)
-        scale_products(block(t.D, first), Z, 0)
-    add_to_band(t.start, first, ld, m, K, Z, A)
+# laws with a history: :class:`~.kernel.ElementsWithHistory` is for NumPy
+
+#: The time of an increment that stands for its start.
+AT_START = -1.0
+
+
+@source
+def of_block(x, first, out):
+    """Values (., points, ne) of a block of elements, (., points, W); the last fills the block."""
+    last = min(out.shape[2], x.shape[2] - first)
+    for k in range(len(out)):
+        for p in range(out.shape[1]):
+            a, b = x[k, p, first:], out[k, p]
+            for e in range(last):
+                b[e] = a[e]
+            for e in range(last, len(b)):
+                b[e] = a[last - 1]
+
+
+@apart("histories", CompiledTables, int, F3, float, F3, F3)
+def evaluate_increment(t, first, E, dt, out, after):
+    """Stress and moduli (c + c^2, points, W), or energy (1, ...), of strains (c, points, W) less
+    eigenstrains, and the history after an increment; at its start if dt is AT_START."""
+    m, n, scale = t.memory, len(E), t.law.scale
+    shift, h = np.empty(E.shape), np.empty(after.shape)
+    of_block(m.before if dt < 0.0 else m.now, first, shift)
+    if len(m.elastic) > 0:
+        elastic(m, first, E, shift, out)
+        return
+    of_block(m.history, first, h)
+    for c in range(n):
+        x, y, z = E[c].ravel(), shift[c].ravel(), scale[c]
+        for k in range(len(x)):
+            x[k] = z * (x[k] - y[k])
+    evaluate_history(t.law, E, h, max(dt, 0.0), out, after)
+    for c in range(len(out)):
+        z = scale[c] if c < n else scale[(c - n) // n] * scale[(c - n) % n]
+        if z != 1.0:
+            x = out[c].ravel()
+            for k in range(len(x)):
+                x[k] *= z
+
+
+@source
+def elastic(m, first, E, shift, out):
+    """Stress and moduli of what is elastic."""
+    n = len(E)
+    of_block(m.stress, first, out[:n])
+    for c in range(n):
+        for d in range(n):
+            out[n + n * c + d] = m.elastic[c, d]
+            x, y, z = E[d].ravel(), shift[d].ravel(), out[c].ravel()
+            for k in range(len(x)):
+                z[k] += m.elastic[c, d] * (x[k] - y[k])

@@ -112,7 +112,7 @@ class CompiledTables(NamedTuple):
 
 def compiled_tables(t: StrainTables) -> CompiledTables:
     """The CompiledTables of a StrainTables."""
-    ne, pattern, section = len(t.start), t.pattern, t.kind == SECTION
+    ne, pattern, section = len(t.start), t.pattern, t.pattern.kind == SECTION
 
     def each(x, column):  # (1 or ne, ...)
         return x[t.at[:, column]] if len(x) > 1 else x
@@ -126,28 +126,44 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
             [R[:, g[:n]], R[:, h[n:]] / R[:, g[n:]]], axis=1)
         frame, H = frame / R[:, :, None], H * sigma[:, a] * sigma[:, b]
         scales, reach = (_scales(D), _scales(sigma)), sigma * reach if reach.size else sigma
-    K, Z, coupled = _constant(each(t.C, OF_C), D)
-    P, Q = map(np.ascontiguousarray, _products(G[0], pattern.products, own))
+    m, C = G.shape[2], each(t.C, OF_C)
+    (k, l, one, other), (*_, two, opposite) = _lower(m, 0), _lower(m, -1)
+    K, Z, coupled = _NOTHING, _NOTHING, np.zeros((3, 0), np.int64)
+    if len(C):  # for scaled unknowns
+        C = C.reshape(len(C), m, 2, m, 2)
+        if len(D) > 1:
+            C = C / (D[:, :, None, None, None] * D[:, None, None, :, None])
+        C = C[:, k, :, l]
+        xy, yx = 0.5 * C[..., 0, 1], 0.5 * C[..., 1, 0]
+        K, Z = np.array([C[..., 0, 0], C[..., 1, 1], xy + yx]).transpose(2, 1, 0), xy - yx
+        acts = K.any(axis=0)
+        acts[:, 2] |= Z.any(axis=1) & (k != l)
+        coupled = np.array([k, l, acts[:, 2]], np.int64).compress(acts.any(axis=1), 1)
+        K, Z = _blocks(K), _blocks(Z.T.compress(k != l, 1))
+    P = Q = np.zeros((0, 0))
+    if not own:
+        g, h = pattern.products
+        both = (G[0].take(g, 0).T[:, None] * G[0].take(h, 0).T).reshape(m * m, -1)
+        P = both.take(one, 0) + both.take(other, 0)
+        Q = np.ascontiguousarray((both.take(two, 0) - both.take(opposite, 0)).compress(g != h, 1))
     along, mixing = map(_sparse, (
         t.along, t.along[:0] if t.law.kind == LINEAR else to_moduli(
-            t.pattern, t.weights.shape[1], t.along.tobytes())))
+            t.pattern, t.weights.shape[1], t.along)))
+    rest = _NOTHING
+    if not section:
+        z = frame.view(complex)[..., 0].T
+        rest = _blocks(np.array([np.abs(z[::2]), (z[1::2] / z[::2]).imag]).T)
     used = G.any(axis=0).ravel().astype(np.int64) if own else _NO_INTS
     return CompiledTables(
-        compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
+        compiled_pattern(pattern), pattern.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _scales(reach),
-        _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled,
+        _blocks(frame), rest, _blocks(H), P, Q, K, Z, coupled,
         t.law, along, _blocks(each(t.weights, OF_WEIGHTS)), mixing, _NO_MEMORY)
 
 
 def _sparse(A):
     A = coo_array(A)
     return Sparse(*(x.astype(np.int64) for x in A.coords), A.data)
-
-
-def _rest(x):
-    """|r_X| and the curvature of rows (k, 2 points, 2) of a cable."""
-    z = x.view(complex)[..., 0].T
-    return _blocks(np.array([np.abs(z[::2]), (z[1::2] / z[::2]).imag]).T)
 
 
 def _blocks(x):
@@ -172,33 +188,3 @@ def _lower(m, k):
 def _scales(x):
     """Blocks of factors (1 or ne, n), empty if all are one."""
     return _NOTHING if (x == 1.0).all() else _blocks(x)
-
-
-def _products(G, products, own):
-    """P and Q of derivatives (rows, m)."""
-    if own:
-        return np.zeros((0, 0)), np.zeros((0, 0))
-    m, (g, h) = G.shape[1], products
-    both = (G.take(g, 0).T[:, None] * G.take(h, 0).T).reshape(m * m, -1)
-    (*_, one, other), (*_, two, opposite) = _lower(m, 0), _lower(m, -1)
-    return (both.take(one, 0) + both.take(other, 0),
-            (both.take(two, 0) - both.take(opposite, 0)).compress(g != h, 1))
-
-
-def _constant(C, D):
-    """K and Z of matrices C (k, 2 m, 2 m) for scaled unknowns, and the functions k >= l that they
-    couple, with 1 if component x of one acts on y of the other."""
-    if not len(C):
-        return _NOTHING, _NOTHING, np.zeros((3, 0), np.int64)
-    m = D.shape[1]
-    k, l, *_ = _lower(m, 0)
-    C = C.reshape(len(C), m, 2, m, 2)
-    if len(D) > 1:
-        C = C / (D[:, :, None, None, None] * D[:, None, None, :, None])
-    C = C[:, k, :, l]
-    one, two = 0.5 * C[..., 0, 1], 0.5 * C[..., 1, 0]
-    K, Z = np.array([C[..., 0, 0], C[..., 1, 1], one + two]).transpose(2, 1, 0), one - two
-    used = K.any(axis=0)
-    used[:, 2] |= Z.any(axis=1) & (k != l)
-    coupled = np.array([k, l, used[:, 2]], np.int64).compress(used.any(axis=1), 1)
-    return _blocks(K), _blocks(Z.T.compress(k != l, 1)), coupled

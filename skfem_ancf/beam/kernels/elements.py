@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, cached_property
-from .tables import (CABLE, LINEAR, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, Pattern, StrainTables,
-                     conserve, law_evaluate)
+from ...core import Array, array_cache, cached_property, primitive
+from .tables import (CABLE, HISTORY, LINEAR, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, Pattern,
+                     StrainTables, conserve, law_evaluate)
 
 #: Mode of ``take`` for valid numbers, which is the fastest.
 CLIP: Any = "clip"
@@ -52,30 +52,25 @@ def scaled(G: Array) -> tuple[Array, Array, Array]:
 def _entries(m: int) -> Any:
     """Lower half of an element matrix with the left node's position, from its parts."""
     # Returns rows, columns and signs of the entries; functions (without the left node's) and part
-    # of each: xx, yy, or xy, the component x of the first and y of the second function.
+    # of each: xx, yy, or xy, the component x of the first and y of the second function; and their
+    # positions in the parts of :meth:`Elements.matrices`, stacked.
     i, j = np.tril_indices(2 * m + 2)
     (k, x), (l, y) = divmod(i, 2), divmod(j, 2)
     sign = np.where(k == 0, -1.0, 1.0) * np.where(l == 0, -1.0, 1.0)
     k, l = np.where(k == 0, m // 2, k - 1), np.where(l == 0, m // 2, l - 1)
     swap = x > y  # the entry of y and x is that of x and y with functions exchanged
-    return i, j, sign, np.where(swap, l, k), np.where(swap, k, l), np.where(x == y, x, 2)
-
-
-@lru_cache(64)
-def _of_products(m: int) -> Array:
-    """Positions of the entries in the parts of :meth:`Elements.matrices`, stacked."""
-    _, _, _, k, l, part = _entries(m)
+    k, l, part = np.where(swap, l, k), np.where(swap, k, l), np.where(x == y, x, 2)
     high, low, n = np.maximum(k, l), np.minimum(k, l), m * (m + 1) // 2
     number = high * (high + 1) // 2 + low
-    return np.where(part < 2, 3 * number + part, (3 + (k < l)) * n + number)
+    return i, j, sign, k, l, part, np.where(
+        part < 2, 3 * number + part, (3 + (k < l)) * n + number)
 
 
-@lru_cache(64)
-def _to_rows(terms: bytes, rows: int) -> Any:
+@array_cache(64)
+def _to_rows(k: Array, l: Array, rows: int) -> Any:
     """Sparse matrix from coefficients (4 n,) to W (3 rows^2,) of xx, yy and xy between rows."""
     from scipy import sparse
 
-    k, l = np.frombuffer(terms, np.int64).reshape(2, -1)
     n, one = len(k), np.arange(len(k))
     to = np.concatenate([part * rows**2 + a * rows + b for part, a, b in (
         (0, k, l), (0, l, k), (1, k, l), (1, l, k), (2, k, l), (2, l, k))])
@@ -83,13 +78,13 @@ def _to_rows(terms: bytes, rows: int) -> Any:
     return sparse.csr_matrix((np.ones(6 * n), (to, of)), shape=(3 * rows**2, 4 * n))
 
 
-@lru_cache(64)
-def to_moduli(pattern: Pattern, points: int, along: bytes) -> Any:
+@array_cache(64)
+def to_moduli(pattern: Pattern, points: int, along: Array) -> Any:
     """Sparse matrix from moduli at the points (9 points, of fibres points) to those between samples
     (nq)."""
     from scipy import sparse
 
-    (s, z), A = pattern.pairs, np.frombuffer(along).reshape(-1, points, pattern.ns)
+    (s, z), A = pattern.pairs, along.reshape(-1, points, pattern.ns)
     c, n = np.abs(A).sum(axis=1).argmax(axis=0), len(A)  # component of each sample
     M = np.zeros((len(s), n * n, A.shape[1]))
     M[np.arange(len(s)), n * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
@@ -101,18 +96,27 @@ class Elements:
     (N,), weighted stresses and strains (ns, ne), forces (N,), bands flat."""
 
     def __init__(self, t: StrainTables) -> None:
-        self.t, self.ne, self.ns, self.m = t, len(t.start), t.rows.shape[1], t.G.shape[2]
+        self.t, self.ne, self.ns, self.m = t, len(t.start), t.pattern.ns, t.G.shape[2]
         self.kind = t.pattern.kind
         G, R, D = scaled(t.G[t.at[:, OF_G]] if len(t.G) > 1 else t.G)
         self.G, self.own, self._even = G, len(G) > 1, len(R) == 1 or len(G) > 1
         self.R, self.D = R.T[:, None].copy(), D.T[:, None].copy()
         self.x = self._last(t.frame, OF_FRAME)
-        self.start, self.rest = t.start, self.measured(self.x)
+        self.rest = self.measured(self.x)
         self._second, self._sample, self._row, self._direction = t.pattern.ends
         self._last_rows: tuple[Any, ...] = ()  # displacements, with the results of :meth:`at`
+        self._at_band: dict[int, Array] = {}  # flat positions of the lower halves in a band
         # relative DOFs (2 m, ne)
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]
+        # the slice of DOFs, and where in it the element forces of :meth:`add` go
+        self._span = slice(int(t.start.min()), int(t.start.max()) + 2 * self.m + 2)
+        self._ends = np.concatenate([self._dofs, self._left]).ravel() - self._span.start
+        #: Weighted moduli between samples, (nq, ne or 1).
+        self.moduli = self._last(t.H, OF_H)
+        #: The constant stiffness (1 or ne, 2 m, 2 m), or None.
+        self.C: Array | None = (None if not len(t.C) else t.C if len(t.C) == 1 else
+                                t.C[t.at[:, OF_C]])
 
     def _last(self, x, column):
         """A table with the elements as last axis, of length 1 if all are equal."""
@@ -122,17 +126,6 @@ class Elements:
     @cached_property
     def _G_ends(self):
         return np.ascontiguousarray(self.G.transpose(0, 2, 1).take(self._row, axis=2))
-
-    @cached_property
-    def moduli(self) -> Array:
-        """Weighted moduli between samples, (nq, ne or 1)."""
-        return self._last(self.t.H, OF_H)
-
-    @cached_property
-    def C(self) -> Array | None:
-        """The constant stiffness (1 or ne, 2 m, 2 m), or None."""
-        C = self.t.C
-        return None if not len(C) else C if len(C) == 1 else C[self.t.at[:, OF_C]]
 
     # kinematics
 
@@ -234,27 +227,27 @@ class Elements:
         # it is the difference that the shift makes.
         if self.t.law.kind == LINEAR:
             return self.linear_stress(strain)
-        E, C = self.at_points(strain), None if change is None else self.at_points(change)
-        S = self._law_stress(E, C)
-        if shift is not None:
-            S = self._law_stress(E + shift, C) - S
-        return self._weighted(S)
+        return self._weighted(self.of_law(3, self.at_points(
+            strain), None if change is None else self.at_points(change), shift))
 
-    def _law_stress(self, E, C):
-        S = np.empty_like(E)
-        law_evaluate(self.t.law, E, S)
-        if C is not None:
-            conserve(self.t.law, E, C, S)
-        return S
+    def of_law(self, n: int, E: Array, change: Array | None = None, shift: Array | None = None
+               ) -> Array:
+        """What a nonlinear law has at strains E (3, points, ne): 1, the energy, 3 stresses, 9
+        moduli, or 12, both; see :meth:`stress`."""
+        found = np.empty((n, *E.shape[1:]), E.dtype)
+        law_evaluate(self.t.law, E, found)
+        if change is not None:
+            conserve(self.t.law, E, change, found)
+        return found if shift is None else self.of_law(n, E + shift, change) - found
 
     @cached_property
     def _reach_of_pairs(self):
-        return None if self.reach is None else self.reach[self.t.pairs].prod(axis=0)
+        return None if self.reach is None else self.reach[self.t.pattern.pairs].prod(axis=0)
 
     @cached_property
     def _to_moduli(self):
         """Sparse matrix from moduli at the points (9 points) to those between samples (nq)."""
-        return to_moduli(self.t.pattern, self.t.weights.shape[1], self.t.along.tobytes())
+        return to_moduli(self.t.pattern, self.t.weights.shape[1], self.t.along)
 
     def _moduli_of_samples(self, D):
         """Moduli (nq, ne) between samples from those at the points, as if they were symmetric."""
@@ -265,22 +258,14 @@ class Elements:
         """Weighted stresses (ns, ne), and moduli (nq, ne) between samples."""
         if self.t.law.kind == LINEAR:
             return self.linear_stress(strain), self.moduli
-        both = np.empty((12, len(self.t.along) // 3, self.ne))
-        law_evaluate(self.t.law, self.at_points(strain), both)
+        both = self.of_law(12, self.at_points(strain))
         return self._weighted(both[:3]), self._moduli_of_samples(both[3:])
 
     def moduli_at(self, strain: Array, shift: Array | None = None) -> Array:
         """Moduli (nq, ne) between samples, or their change by a shift as in :meth:`stress`."""
         if self.t.law.kind == LINEAR:
             return self.moduli
-        E = self.at_points(strain)
-        D = np.empty((9, *E.shape[1:]))
-        law_evaluate(self.t.law, E, D)
-        if shift is not None:
-            still, D = D, np.empty_like(D)
-            law_evaluate(self.t.law, E + shift, D)
-            D -= still
-        return self._moduli_of_samples(D)
+        return self._moduli_of_samples(self.of_law(9, self.at_points(strain), shift=shift))
 
     # force
 
@@ -306,22 +291,13 @@ class Elements:
         at, F = self._ends, np.concatenate([F, -F[q:q + 1]]).ravel()
         f[self._span] += np.bincount(at, F, self._span.stop - self._span.start)
 
-    @cached_property
-    def _span(self):
-        """The slice of DOFs."""
-        return slice(int(self.t.start.min()), int(self.t.start.max()) + 2 * self.m + 2)
-
-    @cached_property
-    def _ends(self):
-        return np.concatenate([self._dofs, self._left]).ravel() - self._span.start
-
     # tangent
 
     @cached_property
     def _terms(self):
         """:attr:`Pattern.coefficients` with the factors R of the rows."""
         (*found, k, l, factor, geometric), (g, h), R = (
-            self.t.pattern.coefficients, self.t.rows, self.R[:, 0])
+            self.t.pattern.coefficients, self.t.pattern.rows, self.R[:, 0])
         return (*found, k, l, (factor * R[k] * R[l])[:, None],
                 (geometric * R[g] * R[h])[:, None])
 
@@ -369,7 +345,7 @@ class Elements:
         """Element matrices Q of coefficients, in parts for :func:`_entries`."""
         if self.own:
             rows, (_, _, _, k, l, _, _) = self.G.shape[1], self._terms
-            to = _to_rows(np.array([k, l], np.int64).tobytes(), rows)
+            to = _to_rows(k, l, rows)
             W = (to @ np.concatenate([w[:, 0], w[:, 1], xy, yx])).T.reshape(self.ne, -1, rows)
             WG = np.matmul(W, self.G).reshape(self.ne, 3, rows, self.m)
             return np.matmul(self.G.transpose(0, 2, 1)[:, None], WG)
@@ -380,15 +356,15 @@ class Elements:
 
     def lower(self, K: Array) -> Array:
         """Entries of the lower half with the left node's position, (entries, ne)."""
-        _, _, sign, k, l, part = _entries(self.m)
+        _, _, sign, k, l, part, place = _entries(self.m)
         if self.own:
             at = (part * self.m + k) * self.m + l
             return K.reshape(self.ne, -1).take(at, axis=1).T * sign[:, None]
-        return K.take(_of_products(self.m), 0, None, CLIP) * self._signs
+        return K.take(place, 0, None, CLIP) * self._signs
 
     @cached_property
     def _signs(self):
-        _, _, sign, k, l, _ = _entries(self.m)
+        _, _, sign, k, l, *_ = _entries(self.m)
         return sign[:, None] * self.D[k, 0] * self.D[l, 0]
 
     def tangent(self, one: Any, Y: Array, T: Array, moduli: Array | None) -> Array:
@@ -423,19 +399,10 @@ class Elements:
     def add_to_band(self, K: Array, flat: Array, ld: int) -> None:
         """Add lower halves (entries, ne) to a band, entry (i, j) at ``flat[j * ld + i - j]``."""
         first, last = self._span.start * ld, min(self._span.stop * ld, len(flat))
-        flat[first:last] += np.bincount(self._positions(ld), K.ravel(), last - first)
-
-    def _positions(self, ld):
-        """Positions of the lower halves in a band, flat."""
         if ld not in self._at_band:
-            i, j, *_ = _entries(self.m)
-            start = self.t.start - self._span.start
+            (i, j, *_), start = _entries(self.m), self.t.start - self._span.start
             self._at_band[ld] = ((start + j[:, None]) * ld + (i - j)[:, None]).ravel()
-        return self._at_band[ld]
-
-    @cached_property
-    def _at_band(self):
-        return {}
+        flat[first:last] += np.bincount(self._at_band[ld], K.ravel(), last - first)
 
     # derivatives
 
@@ -452,6 +419,135 @@ class Elements:
 
     def square(self, moduli: Array) -> Array:
         """Moduli between samples as matrices, (1 or ne, ns, ns)."""
-        H, (s, z) = np.zeros((moduli.shape[1], self.ns, self.ns)), self.t.pairs
+        H, (s, z) = np.zeros((moduli.shape[1], self.ns, self.ns)), self.t.pattern.pairs
         H[:, s, z] = H[:, z, s] = moduli.T
         return H
+
+
+# Kernels. Displacements u are (N,); f (N,) and ``flat`` are added to. Stresses are weighted, flat,
+# (ne, ns); ``flat, ld`` store entry (i, j), i >= j, of a tangent at ``flat[j * ld + i - j]``.
+# Forces and tangents of the strain include the constant stiffness. Arrays of size 0 are not used.
+# In compiled code the functions of the same names in :mod:`.loops` replace them.
+
+#: Marks kernels with a compiled version.
+kernel = primitive("skfem_ancf.beam.kernels.loops")
+
+
+def _given(e, T):
+    """Stresses (ns, ne) from those of all elements, flat."""
+    return T.reshape(e.ne, e.ns).T
+
+
+def _put(e, T, out):
+    """Write stresses (ns, ne) to ``out``, flat."""
+    out.reshape(e.ne, e.ns)[:] = T.T
+
+
+def _moved(e, u, v):
+    """Relative DOFs, change of the rows from the reference, that from u to v, and directions."""
+    # With v, DOFs and directions are means from u to v; without it, the second change is None.
+    U, d, one, Y = e.at(u)
+    if not v.size:
+        return U, (d, one), None, Y
+    dU = e.relative(v - u)
+    dd = e.rows(dU)
+    return U + 0.5 * dU, (d, one), dd, e.directions(one, e.measured(e.x + d + dd))
+
+
+def _strain(e, at, dd, Y):
+    """The strain, in the middle, and its change or None."""
+    strain, change = e.strain(*at), None if dd is None else e.change(Y, dd)
+    return strain if change is None else strain + 0.5 * change, change
+
+
+@kernel
+def run_force(e, u, v, given, out, f):
+    """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
+    Given stresses act in place of those of the strain; without ``out``, they act without the
+    constant stiffness."""
+    U, at, dd, Y = _moved(e, u, v)
+    T, whole = None, out.size > 0 or given.size == 0
+    if whole:
+        T = e.stress(*_strain(e, at, dd, Y))
+    if out.size:
+        _put(e, T, out)
+    if f.size:
+        e.add(e.force(Y, _given(e, given) if given.size else T, U if whole else None), f)
+
+
+@kernel
+def run_linearised(e, u, du, given, out, f):
+    """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
+    _, d, one, Y = e.at(u)
+    moduli = e.moduli if e.t.law.kind == LINEAR else e.moduli_at(e.strain(d, one))
+    T = e.linear_stress(e.change(Y, e.rows(e.relative(du))), moduli)
+    if out.size:
+        _put(e, _given(e, given) + T, out)
+    if f.size:
+        e.add(e.force(Y, T), f)
+
+
+@kernel
+def run_tangent(e, u, given, out, f, flat, ld):
+    """Tangent and force at u; writes the stresses."""
+    # The geometric part has the given stresses, or those of the strain if there are none.
+    U, d, one, Y = e.at(u)
+    T, moduli = e.stress_and_moduli(e.strain(d, one))
+    if f.size:
+        e.add(e.force(Y, T, U), f)
+    if out.size:
+        _put(e, T, out)
+    K = e.tangent(one, Y, _given(e, given) if given.size else T, moduli)
+    if e.constant is not None:
+        K += e.constant
+    e.add_to_band(K, flat, ld)
+
+
+@kernel
+def run_unsymmetric(e, u, v, flat, ld):
+    """Add ``B(u)^T D (B(v) - B(u))`` to a matrix, entry (i, j) at ``flat[j * ld + i - j]``."""
+    _, d, one, Y = e.at(u)
+    B, change = e.derivatives(Y), e.derivatives(e.at(v)[3])
+    K = B.transpose(0, 2, 1) @ (e.square(e.moduli_at(e.strain(d, one))) @ (change - B))
+    j = np.arange(K.shape[1])
+    at = (e.t.start[:, None, None] + j) * ld + j[:, None] - j
+    flat += np.bincount(at.ravel(), K.ravel(), len(flat))
+
+
+@kernel
+def run_put(e, given):
+    """Set the eigenstrains of a law with a history, minus ``given`` at the points."""
+    if e.t.law.kind == HISTORY:
+        e.now[:] = -given.reshape(e.now.shape)
+
+
+@kernel
+def run_eigen_force(e, u, v, given, f):
+    """Change of the force at u, or with v of the mean from u to v, by eigenstrains."""
+    # ``given`` are stresses for a linear law, else strains at the points, (3, points, ne). Laws
+    # with a history have it in their strain, see :func:`run_put`.
+    if e.t.law.kind == LINEAR:
+        run_force(e, u, v, given, u[:0], f)
+    elif e.t.law.kind != HISTORY:
+        _, at, dd, Y = _moved(e, u, v)
+        e.add(e.force(Y, e.stress(*_strain(e, at, dd, Y), given.reshape(3, -1, e.ne))), f)
+
+
+@kernel
+def run_eigen_tangent(e, u, given, flat, ld):
+    """Change of the tangent at u by eigenstrains."""
+    if e.t.law.kind == HISTORY:
+        return
+    _, d, one, Y = e.at(u)
+    T, moduli = _given(e, given) if e.t.law.kind == LINEAR else None, None
+    if T is None:
+        strain, shift = e.strain(d, one), given.reshape(3, -1, e.ne)
+        T, moduli = e.stress(strain, shift=shift), e.moduli_at(strain, shift)
+    e.add_to_band(e.tangent(one, Y, T, moduli), flat, ld)
+
+
+@kernel
+def run_accept(e, u, v, out):
+    """Set the history after an increment from u to v; add what it dissipates to ``out[0]``."""
+    if e.t.law.kind == HISTORY:
+        out[0] += e.accept(u, v)

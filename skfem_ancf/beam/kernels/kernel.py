@@ -9,13 +9,8 @@ import numpy as np
 from ...core import Array, cached_property, refuse
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
-from .elements import Elements
-from .runs import run_eigen_force, run_eigen_tangent, run_force, run_tangent
-from .tables import (CABLE, HISTORY, LINEAR, StrainTables, law_evaluate, material_of, repeated,
-                     separated)
-
-#: Approximate number of elements whose energies are evaluated together.
-TOGETHER = 4096
+from .elements import Elements, run_eigen_force, run_eigen_tangent, run_force, run_tangent
+from .tables import CABLE, HISTORY, LINEAR, StrainTables, material_of, repeated, separated
 
 
 class ElementKernel:
@@ -33,6 +28,18 @@ class ElementKernel:
         self.nd, self.t = 2 * element.nodal_dofs, mesh.t
         self._ends: Any = (slice(-1), slice(1, None)) if mesh.is_chain else mesh.t
         self.N = self.nd * mesh.p.shape[1]
+
+    def _tables_of(self, pattern, G, frame, H, law, *points, constant=True):
+        """StrainTables of all elements, with the constant stiffness or without; ``points`` are
+        their last three."""
+        n, whole = 2 * self.nd - 2, self.constant if constant else None
+        C = np.zeros((0, n, n)) if whole is None else whole[:, 2:, 2:]
+        each = [len(x) > 1 for x in (G, frame, H, C, points[1])]
+        return StrainTables(
+            pattern, self.nd * self.t[0].astype(np.int64),
+            np.arange(self.t.shape[1])[:, None] * each,
+            *map(np.ascontiguousarray, (G, frame, H, C)), law,
+            *map(np.ascontiguousarray, points))
 
     def gather(self, u: Array, elements: Any = slice(None)) -> Array:
         """Element values (ne, nb, 2) of DOFs (N,)."""
@@ -53,11 +60,6 @@ class ElementKernel:
         return u if u.dtype.kind == "c" else np.ascontiguousarray(u, dtype=float)
 
     @property
-    def shared(self) -> bool:
-        """True if all elements have the same table."""
-        return len(self.tables[0].G) == 1
-
-    @property
     def linear(self) -> bool:
         """True if all moduli are constant."""
         return all(t.law.kind == LINEAR for t in self.tables)
@@ -73,7 +75,7 @@ class ElementKernel:
         """Strain energy of a displacement (N,), or of several, (k, N): shape () or (k,)."""
         if u.ndim == 1:
             return np.sum(self.energies(u))
-        n = max(1, TOGETHER // self.t.shape[1])
+        n = max(1, 4096 // self.t.shape[1])  # of about so many elements together
         return np.concatenate([np.sum(self._energies(u[k:k + n]), axis=1)
                                for k in range(0, len(u), n)])
 
@@ -87,7 +89,15 @@ class ElementKernel:
         many = self.elements if k == 1 else [
             elements_of(repeated(t, k, self.N)) for t in self.tables]
         for e in many:
-            out += energies_of(e, u.ravel())
+            strain = strains(e, u.ravel())
+            if e.t.law.kind == LINEAR:
+                out += 0.5 * np.sum(strain * e.linear_stress(strain), axis=0)
+            else:
+                out += energy_at(e, e.at_points(strain))
+            if e.C is not None:
+                U = e.relative(u.ravel()).reshape(2 * e.m, -1)
+                out += 0.5 * np.einsum("ie,kij,je->e" if len(e.C) == 1 else "ie,eij,je->e", U,
+                                       e.C, U)
         return out.reshape(k, -1)
 
     @cached_property
@@ -128,7 +138,7 @@ class ElementKernel:
 
     def eigenstrain_tangents(self, given: list[Array], u: Array) -> Array:
         """Change of the :meth:`tangents` by eigenstrains, see :meth:`eigenstrain_forces`."""
-        return self._tangents(run_eigen_tangent, u, self._apart, given)
+        return self._tangents(run_eigen_tangent, u, given)
 
     def _forces(self, u, v=None, given=None, eigen=False):
         """Element forces at u, or means from u to v, of the strain, or of given stresses."""
@@ -178,18 +188,24 @@ class ElementKernel:
 
     def tangents(self, u: Array) -> Array:
         """Element tangents (ne, 2 nb, 2 nb)."""
-        return self._tangents(_run_tangent, u, self._apart)
+        return self._tangents(lambda e, u, given, flat, ld: run_tangent(
+            e, u, given, given, given, flat, ld), u)
 
     def geometric(self, u: Array, stress: Array) -> Array:
         """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m)."""
         # The stresses of all :attr:`tables` are side by side; further columns are ignored.
-        given = np.split(stress, np.cumsum([t.rows.shape[1] for t in self.tables]), axis=1)
-        return self._tangents(_run_geometric, u, self._apart, given)
+        given = np.split(stress, np.cumsum([t.pattern.ns for t in self.tables]), axis=1)
 
-    def _tangents(self, run, u, elements, given=None):
+        def run(e, u, given, flat, ld):
+            _, _, one, Y = e.at(u)
+            e.add_to_band(e.tangent(one, Y, given.reshape(e.ne, e.ns).T, None), flat, ld)
+
+        return self._tangents(run, u, given)
+
+    def _tangents(self, run, u, given=None):
         u, n = self.gather(self._checked(u)).ravel(), 2 * self.nd
         flat = np.zeros((self.t.shape[1], n, n + 1))
-        for k, e in enumerate(elements):
+        for k, e in enumerate(self._apart):
             run(e, u, u[:0] if given is None else given[k].ravel(), flat.reshape(-1), n + 1)
         i, j = np.tril_indices(n)
         out = np.empty((len(flat), n, n))
@@ -206,7 +222,13 @@ class ElementKernel:
             found.append(np.array([B, e.square(e.moduli_at(strain)) @ B]))
             stresses.append(e.stress(strain).T)
         if self.constant is not None:
-            R = np.broadcast_to(_square_root(self.constant), (ne, n, n))
+            # R with R^T R = constant, which is semidefinite
+            size = np.sqrt(np.diagonal(self.constant, axis1=1, axis2=2))  # units of DOFs differ
+            size = np.where(size > 0.0, size, 1.0)[:, :, None]
+            values, V = np.linalg.eigh(self.constant / (size * size.transpose(0, 2, 1)))
+            values = np.where(values > 1e-12 * values[:, -1:], values, 0.0)
+            R = (np.sqrt(values[:, None]) * V * size).transpose(0, 2, 1)
+            R = np.broadcast_to(R, (ne, n, n))
             found.append(np.array([R, R]))
             stresses.append((R @ self.gather(u).reshape(ne, n, 1))[..., 0])
         return *np.concatenate(found, axis=2), np.concatenate(stresses, axis=1)
@@ -214,24 +236,6 @@ class ElementKernel:
     def inverted(self, u: Array) -> bool:
         """True if the body is turned inside out somewhere."""
         return False
-
-
-def _run_tangent(e, u, given, flat, ld):
-    run_tangent(e, u, given, given, u[:0], flat, ld)
-
-
-def _run_geometric(e, u, given, flat, ld):
-    _, _, one, Y = e.at(u)
-    e.add_to_band(e.tangent(one, Y, given.reshape(e.ne, e.ns).T, None), flat, ld)
-
-
-def _square_root(K):
-    """R with R^T R = K, for semidefinite matrices (k, n, n)."""
-    size = np.sqrt(np.diagonal(K, axis1=1, axis2=2))  # units of the DOFs differ
-    size = np.where(size > 0.0, size, 1.0)[:, :, None]
-    values, V = np.linalg.eigh(K / (size * size.transpose(0, 2, 1)))
-    values = np.where(values > 1e-12 * values[:, -1:], values, 0.0)
-    return (np.sqrt(values[:, None]) * V * size).transpose(0, 2, 1)
 
 
 def strains(e: Elements, u: Array) -> Array:
@@ -243,26 +247,11 @@ def strains(e: Elements, u: Array) -> Array:
     return strain + 1j * e.change(Y, e.rows(e.relative(u.imag)))
 
 
-def energies_of(e: Elements, u: Array) -> Array:
-    """Energies of the elements, (ne,)."""
-    strain = strains(e, u)
-    if e.t.law.kind == LINEAR:
-        out = 0.5 * np.sum(strain * e.linear_stress(strain), axis=0)
-    else:
-        out = energy_at(e, e.at_points(strain))
-    if e.C is not None:
-        U = e.relative(u).reshape(2 * e.m, -1)
-        out += 0.5 * np.einsum("ie,kij,je->e" if len(e.C) == 1 else "ie,eij,je->e", U, e.C, U)
-    return out
-
-
 def energy_at(e: Elements, E: Array) -> Array:
     """Energy (ne,) of strains (3, points, ne) at the integration points."""
     if isinstance(e, ElementsWithHistory):
         return np.sum(e.weights * e.energy(E), axis=0)
-    W = np.empty((1, *E.shape[1:]), E.dtype)
-    law_evaluate(e.t.law, E, W)
-    return np.sum(e.weights * W[0], axis=0)
+    return np.sum(e.weights * e.of_law(1, E)[0], axis=0)
 
 
 def stresses_of(e: Elements, strain: Array) -> Array:
@@ -281,12 +270,10 @@ class Past(NamedTuple):
 
 def history_size(t: StrainTables) -> int:
     """Number of history variables and components of eigenstrain; 0 for elastic laws."""
-    return 0 if t.law.kind != HISTORY else _rows(t) * t.weights.shape[1] * len(t.start)
-
-
-def _rows(t):
-    """Variables of a point, and its components of strain: cables have fibres."""
-    return material_of(t.law).number + (1 if t.kind == CABLE else 3)
+    if t.law.kind != HISTORY:
+        return 0
+    rows = material_of(t.law).number + (1 if t.pattern.kind == CABLE else 3)
+    return rows * t.weights.shape[1] * len(t.start)
 
 
 def elements_of(t: StrainTables) -> Elements:
@@ -308,8 +295,8 @@ def remembering(elements: Sequence[Elements], past: Past) -> list[Elements]:
 #: Relative difference of strains that is round-off.
 SAME = 1e-12
 #: What copies of elements share.
-CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_reach_of_pairs", "_ends",
-            "_products", "_signs", "_at_band")
+CONSTANT = ("weights", "reach", "constant", "_G_ends", "_to_moduli", "_reach_of_pairs",
+            "_products", "_signs")
 
 
 class ElementsWithHistory(Elements):
@@ -320,14 +307,14 @@ class ElementsWithHistory(Elements):
 
     def __init__(self, t: StrainTables) -> None:
         super().__init__(t)
-        self.material, self._fibres = material_of(t.law), t.kind == CABLE
+        self.material, self._fibres = material_of(t.law), t.pattern.kind == CABLE
         self._own(np.zeros(history_size(t)), np.zeros(1), np.zeros(history_size(t)))
         self._scale = t.law.scale.reshape(3, 1, 1)
         self._known: Any = (np.zeros(0), None, np.zeros(0), np.zeros(0), np.nan)
         self.elastic: Any = None  # moduli (c, c) and stress at zero strain if it is elastic
 
     def _own(self, history, span, now):
-        shape, n = (_rows(self.t), self.t.weights.shape[1], self.ne), self.material.number
+        shape, n = (-1, self.t.weights.shape[1], self.ne), self.material.number
         self.history, self.before = np.split(history.reshape(shape), [n])
         self.now, self.span = now.reshape(shape)[n:], span
 

@@ -1,17 +1,15 @@
-"""Compiled kernels: the functions of :mod:`.runs` as loops over blocks of elements. t are
+"""Compiled kernels: the kernels of :mod:`.elements` as loops over blocks of elements. t are
 :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and ``out`` are stresses (ne
 ns,), or of size 0. Other arrays are as in :mod:`.blocks`."""
 
 import numpy as np
 
-from ...core.band import add_multiple
-from ...core import F1, F2, I1, apart, room, source
-from .blocks import (add, add_forces_of, add_geometric, add_material, add_matrices, at_points,
-                     block, changes, components, directions, displaced, from_points, gather,
-                     between_samples, moduli, place, products, put, scale_products, strains,
-                     stresses, take, times, to_rows)
+from ...core import F1, F2, add_multiple, apart, room, source
+from .blocks import (AT_START, add, add_forces_of, add_geometric, add_material, add_matrices,
+                     at_points, between_samples, block, changes, components, directions, displaced,
+                     evaluate_increment, from_points, gather, law_stresses, moduli, of_block, place,
+                     products, put, scale_products, strains, take, times, to_rows)
 from .compiled import W, CompiledTables
-from .increments import AT_START, evaluate_increment, of_block
 from .tables import HISTORY, LINEAR, conserve, evaluate_history, law_evaluate
 
 
@@ -42,7 +40,10 @@ def run_force(t, u, v, given, out, f):
                 changes(t, D, dd, C)
                 add(0.5, C, E)
                 add(0.5, V, U)
-            stresses(t, first, E, C, T)
+            if t.law.kind == LINEAR:
+                times(t.pattern.pairs, block(t.H, first), E, T)
+            else:
+                law_stresses(t, first, E, C, T)
         if out.size > 0:
             put(t, first, T, out[:0], out)
         if given.size > 0:
@@ -119,9 +120,9 @@ def run_unsymmetric(t, u, v, A, ld):
         gather(t, first, du, U)
         to_rows(t, first, U, d)
         for g in range(R):
-            a, b, c = r[g], d[g], s[g]
-            for e in range(len(c)):
-                c[e] = a[e] + b[e]
+            before, change, after = r[g], d[g], s[g]
+            for e in range(len(after)):
+                after[e] = before[e] + change[e]
         one, two = directions(t, r, d[:0], X), directions(t, s, d[:0], Y)
         add(-1.0, one, two)
         w[:] = 0.0
@@ -131,7 +132,18 @@ def run_unsymmetric(t, u, v, A, ld):
         if len(t.D) > 0:
             scale_products(block(t.D, first), K, 1)
             scale_products(block(t.D, first), Z, 0)
-        add_unsymmetric(t.start, first, ld, m, K, Z, A)
+        # matrices that are not symmetric
+        for j in range(2 * m + 2):
+            l, b, sj = place(j, m)
+            for i in range(2 * m + 2):
+                k, a, si = place(i, m)
+                high, low, at = max(k, l), min(k, l), (2 * a + b) * W
+                for e in range(min(W, len(t.start) - first)):
+                    x = K[high * (high + 1) // 2 + low, at + e]
+                    if k != l:
+                        y = Z[high * (high - 1) // 2 + low, at + e]
+                        x += y if k > l else -y
+                    A[(t.start[first + e] + j) * ld + i - j] += si * sj * x
 
 
 @apart("unsymmetric", CompiledTables, F2, F2, F2, F2, F2)
@@ -150,22 +162,6 @@ def add_difference(t, H, X, D, w, z):
                     o = z[n, 2 * i + j:]
                     for e in range(t.width):
                         o[e] += c * h[e] * (x[i + e] * y[j + e] - X0[i + e] * Y0[j + e])
-
-
-@apart("unsymmetric", I1, int, int, int, F2, F2, F1)
-def add_unsymmetric(start, first, ld, m, K, Z, A):
-    """Add matrices that are not symmetric."""
-    for j in range(2 * m + 2):
-        l, b, sj = place(j, m)
-        for i in range(2 * m + 2):
-            k, a, si = place(i, m)
-            high, low, at = max(k, l), min(k, l), (2 * a + b) * W
-            for e in range(min(W, len(start) - first)):
-                x = K[high * (high + 1) // 2 + low, at + e]
-                if k != l:
-                    y = Z[high * (high - 1) // 2 + low, at + e]
-                    x += y if k > l else -y
-                A[(start[first + e] + j) * ld + i - j] += si * sj * x
 
 
 # eigenstrains

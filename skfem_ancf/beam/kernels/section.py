@@ -14,17 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, first_order, gauss, lagrange, product_rule, refuse
+from ...core import Array, array_cache, first_order, gauss, lagrange, product_rule, refuse
 from ...elements.base import ElementBeam
 from ...formulations import Formulation, Term
 from ...materials.history import HistoryMaterial
 from ...mesh.mesh_beam import MeshBeam
 from ...sections import Across, Layer
 from .kernel import ElementKernel, fibres, strains
-from .tables import CABLE, LINEAR, NO_LAW, OF_WEIGHTS, SECTION, StrainTables, law_tables, pattern_of
-
-#: Relative size of a modulus between samples that is round-off.
-ORTHOGONAL = 1e-14
+from .tables import CABLE, LINEAR, NO_LAW, OF_WEIGHTS, SECTION, law_tables, pattern_of
 
 
 class Integral(NamedTuple):
@@ -48,48 +45,40 @@ class SectionKernel(ElementKernel):
     def __init__(self, across: Across, formulation: Formulation) -> None:
         super().__init__(across.mesh, across.element)
         self.constant = across.stabilisation(formulation)
-        self.tables, self.integrals, self._across = [], [], across
-        rows: dict[Any, Any] = {}
+        self.tables, self.integrals = [], []
+        tind, rows = np.array([0]) if across.uniform else None, dict[Any, Any]()
         for layer, terms in across.terms(formulation):
             for k, term in enumerate(terms):
-                constant = self.constant if not self.tables else None
-                samples, volumes = self._add(layer, term, constant, rows)
+                *nodes, eta, axis = (tuple(np.asarray(x, dtype=float).tolist()) for x in (
+                    *map(term.nodes, ("xx", "yy", "xy")), term.section_nodes, term.axis[0]))
+                samples = samples_of(*nodes, eta)
+                if samples not in rows:
+                    rows[samples] = _rows(across.mesh, across.element, samples, tind)
+                G, frame = rows[samples]
+                whole, (X, W) = len(term.section[0]) == 1, term.quadrature
+                volumes = across.volume(layer, X, W, tind, whole)
+                weights = volumes if layer.grade is None else across.volume(
+                    layer, X, W, tind, whole, "grade")
+                law = law_tables(term.law, self)
+                linear, means = law.kind == LINEAR, (
+                    len(eta) if term.section_samples is None else tuple(
+                        map(tuple, np.asarray(term.section_samples[1]).tolist())))
+                A, pairs, products, sizes = _mixing(samples, tuple(nodes), axis, means, (
+                    law.D != 0.0) | (not linear))
+                H, along = weights @ products, np.zeros((0, A.shape[1]))
+                if linear:  # others are round-off
+                    keep = (np.abs(H) > 1e-14 * (np.abs(weights) @ sizes)).any(axis=0)
+                    keep |= pairs[0] == pairs[1]
+                    pairs, H = pairs.compress(keep, 1), H.compress(keep, 1)
+                else:
+                    along = np.concatenate([
+                        np.where(samples.component == k, A, 0.0) for k in range(3)])
+                H *= law.D[tuple(samples.component[pairs])]
+                self.tables.append(self._tables_of(
+                    pattern_of(SECTION, samples.rows, pairs), G, frame, H, law, along, weights,
+                    np.zeros((len(weights), 0)), constant=not self.tables))
                 self.integrals.append(Integral(layer, term, samples, volumes, k == 0))
         self.points_number = sum(one.volumes.shape[1] for one in self.integrals)
-
-    def _add(self, layer, term, constant, rows):
-        """Add the tables of a term; returns its samples and the volumes of its points."""
-        across, ne, nb = self._across, self.t.shape[1], self.nd
-        tind = np.array([0]) if across.uniform else None
-        *nodes, eta, axis = (tuple(np.asarray(x, dtype=float).tolist()) for x in (
-            *map(term.nodes, ("xx", "yy", "xy")), term.section_nodes, term.axis[0]))
-        samples = samples_of(*nodes, eta)
-        if samples not in rows:
-            rows[samples] = _rows(across.mesh, across.element, samples, tind)
-        G, frame = rows[samples]
-        whole, X = len(term.section[0]) == 1, term.quadrature
-        volumes = across.volume(layer, *X, tind, whole)
-        weights = volumes if layer.grade is None else across.volume(layer, *X, tind, whole, "grade")
-        law = law_tables(term.law, self)
-        linear, means = law.kind == LINEAR, len(eta) if term.section_samples is None else tuple(
-            map(tuple, np.asarray(term.section_samples[1]).tolist()))
-        A, pairs, products, sizes = _mixing(samples, tuple(nodes), axis, means, (
-            law.D != 0.0).tobytes() if linear else b"\1" * 9)
-        H, along = weights @ products, np.zeros((0, A.shape[1]))
-        if linear:
-            keep = (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ sizes)).any(axis=0)
-            keep |= pairs[0] == pairs[1]
-            pairs, H = pairs.compress(keep, 1), H.compress(keep, 1)
-        else:
-            along = np.concatenate([np.where(samples.component == k, A, 0.0) for k in range(3)])
-        H *= law.D[tuple(samples.component[pairs])]
-        C = np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if constant is None else constant[:, 2:, 2:]
-        each = [len(x) > 1 for x in (G, frame, H, C, weights)]
-        self.tables.append(StrainTables(
-            pattern_of(SECTION, samples.rows, pairs), nb * self.t[0].astype(np.int64),
-            np.arange(ne)[:, None] * each, *map(np.ascontiguousarray, (G, frame, H, C)), law,
-            along, np.ascontiguousarray(weights), np.zeros((len(weights), 0))))
-        return samples, volumes
 
     @property
     def volume(self) -> float:
@@ -108,7 +97,7 @@ class SectionKernel(ElementKernel):
         for one, e in zip(self.integrals, self.elements):
             if one.first:
                 r = e.x + e.rows(e.relative(u))
-                yield r[e.t.rows[:, one.samples.component == component]]
+                yield r[e.t.pattern.rows[:, one.samples.component == component]]
 
     def inverted(self, u: Array) -> bool:
         for x, y in self._gradients(u, 2):
@@ -186,57 +175,31 @@ def _rows(mesh, element, samples, tind):
     return G[:, :, 1:], frame
 
 
-@lru_cache(64)
+@array_cache(64)
 def _mixing(samples, nodes, axis, means, coupled):
     """Matrix A (points, ns) from the samples to the integration points, pairs s <= t of samples
     that the law couples (2, nq), and the products of their columns and the sizes of these.
 
     ``nodes`` and ``axis`` are axial coordinates of the samples of each component, and of the
     integration points; ``means`` are the weights of the samples across, or their number if these
-    are the points. ``coupled`` are the bytes of a matrix (3, 3): which components are.
+    are the points. ``coupled`` is a matrix (3, 3): which components are.
     """
     across = np.eye(means) if isinstance(means, int) else np.array(means)
     A = np.concatenate([np.kron(np.eye(len(axis)) if at == axis else lagrange(at, axis), across)
                         for at in nodes], axis=1)
     c, size, row = samples.component, np.abs(A), np.arange(A.shape[1])
-    both = np.frombuffer(coupled, bool).reshape(3, 3)[c[:, None], c] & (size.T @ size > 0.0)
+    both = coupled[c[:, None], c] & (size.T @ size > 0.0)
     pairs = np.array((both & (row[:, None] < row) | (row[:, None] == row)).nonzero())
     products = A[:, pairs[0]] * A[:, pairs[1]]
     return A, pairs, products, np.abs(products)
 
 
-#: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
-#: beam; the third point has a quarter of it.
-MIDDLE = 1200.0
-
-
-def softened(weight: float) -> tuple[Array, Array]:
-    """Three points on [0, 1], exact for cubics: two Gauss points and a weighted middle one."""
-    # A weight of 4/9 gives the three-point Gauss rule, which is the maximum.
-    weight = min(weight, 4.0 / 9.0)
-    x = 0.5 / np.sqrt(3.0 * (1.0 - weight))
-    outer = 0.5 * (1.0 - weight)
-    return np.array([0.5 - x, 0.5, 0.5 + x]), np.array([outer, weight, outer])
-
-
-def _square(across):
-    """The largest E I about the centroid over E A."""
-    if across.simple:
-        return across.mesh.height**2 / 12.0
-    EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
-    return float(np.max((EI - ES**2 / EA) / EA))
-
-
+@array_cache(64)
 def _unit(element, points):
     """Derivatives of the axis by xi at each point, the first and the second, (rows, nb), and the
     powers of the length with which they are those by X, (rows,)."""
     slopes = np.stack([element.axis(points, d).T for d in (1, 2)], axis=1)
     return slopes.reshape(2 * len(points), -1), np.tile([-1.0, -2.0], len(points))
-
-
-@lru_cache(64)
-def _unit_at_gauss(element, n):
-    return _unit(element, gauss(n)[0])
 
 
 @lru_cache(64)
@@ -251,15 +214,6 @@ def _samples(n, moduli):
     return pattern_of(CABLE, rows, pairs[:, order]), order
 
 
-def _has_alone(mesh):
-    """True if an element has no neighbour."""
-    t = mesh.t
-    if mesh.is_chain:
-        return t.shape[1] == 1
-    joined = t[0, 1:] == t[1, :-1]
-    return not np.all(np.append(False, joined) | np.append(joined, False))
-
-
 class CableKernel(ElementKernel):
     """The kernel of a cable; ``points`` (points,) are its Gauss points on [0, 1]."""
 
@@ -270,9 +224,22 @@ class CableKernel(ElementKernel):
         n = formulation.points_along(element, across.layers[0].material)
         if n == 2:
             alpha, length = getattr(formulation, "alpha", 1.0), float(mesh.chain_lengths.min())
-            self._rule = softened(alpha * MIDDLE * _square(across) / length**2)
+            if across.simple:
+                square = mesh.height**2 / 12.0
+            else:
+                EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
+                square = float(np.max((EI - ES**2 / EA) / EA))  # E I about the centroid
+            # exact for cubics: two Gauss points and a weighted middle one; a weight of 4/9 gives
+            # the three-point Gauss rule, which is the maximum. 1200 is the stiffness of the mode
+            # that two points miss, in EI over the squared length of the beam; the third point has
+            # a quarter of it
+            middle = min(alpha * 1200.0 * square / length**2, 4.0 / 9.0)
+            x, outer = 0.5 / np.sqrt(3.0 * (1.0 - middle)), 0.5 * (1.0 - middle)
+            self._rule = np.array([0.5 - x, 0.5, 0.5 + x]), np.array([outer, middle, outer])
         else:
-            if self.constant is None and _has_alone(mesh):
+            joined = mesh.t[0, 1:] == mesh.t[1, :-1]
+            alone = ~(np.append(False, joined) | np.append(joined, False))
+            if self.constant is None and alone.any():
                 n = max(n, element.axis_degree)  # no neighbour stabilises modes of fewer points
             self._rule = gauss(n)
         self.points, self._across = self._rule[0], across
@@ -284,26 +251,28 @@ class CableKernel(ElementKernel):
 
     def _table(self, mesh, element, same):
         """Tables of the reference element scaled by the lengths, for one or all elements."""
-        ne, nb, n, w = mesh.nelements, self.nd, self.points_number, self._rule[1]
+        n, w = self.points_number, self._rule[1]
         L = (mesh.lengths[:1] if same else mesh.lengths)[:, None]
-        unit, orders = (_unit_at_gauss(element, n) if self._rule is gauss(n) else
-                        _unit(element, self.points))
+        unit, orders = _unit(element, self.points)
         G = unit * (L**orders)[:, :, None] * element.powers(1.0, L)[:, None]
         EA, ES, EI = self._across.moments(
             self.points, np.zeros(1, int) if same and self._across.constant else None) * (w * L)
         moduli = [EA, EI, -ES] if ES.any() else [EA, EI]
         pattern, order = _samples(n, len(moduli))
         #: Modulus times volume.
-        self.scale = float(EA.sum()) * (ne // len(EA))
+        self.scale = float(EA.sum()) * (mesh.nelements // len(EA))
         H = np.concatenate(moduli, axis=1).take(order, 1)
-        frame = self._frame(mesh, element, n, G)
-        C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
-             self.constant[:, 2:, 2:])
-        each = [len(x) > 1 for x in (G, frame, H, C)] + [False]
-        return StrainTables(
-            pattern, nb * mesh.t[0].astype(np.int64), np.arange(ne)[:, None] * each,
-            *map(np.ascontiguousarray, (G[:, :, 1:], frame, H, C)),
-            NO_LAW, np.zeros((0, 2 * n)), *np.zeros((2, 1, 0)))
+        # r_X and r_XX in the reference configuration
+        if mesh.is_straight:
+            left = mesh.t[0, :1] if mesh.is_uniform else mesh.t[0]
+            frame = np.zeros((len(left), 2 * n, 2))
+            frame[:, ::2] = mesh.p_X[:, left].T[:, None]
+        else:
+            q0 = element.rigid(mesh)
+            q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
+            frame = G @ self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
+        return self._tables_of(pattern, G[:, :, 1:], frame, H, NO_LAW, np.zeros((0, 2 * n)),
+                               *np.zeros((2, 1, 0)))
 
     def _with_fibres(self, mesh, element, same):
         """A table of fibres for each layer."""
@@ -336,17 +305,6 @@ class CableKernel(ElementKernel):
                 C=whole.C[:0] if out else whole.C, law=law, along=along, weights=weights,
                 reach=reach))
         return out
-
-    def _frame(self, mesh, element, n, G):
-        """r_X and r_XX in the reference configuration, (1 or ne, rows, 2)."""
-        if mesh.is_straight:
-            left = mesh.t[0, :1] if mesh.is_uniform else mesh.t[0]
-            frame = np.zeros((len(left), 2 * n, 2))
-            frame[:, ::2] = mesh.p_X[:, left].T[:, None]
-            return frame
-        q0 = element.rigid(mesh)
-        q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
-        return G @ self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
 
     @property
     def weights(self) -> Array:

@@ -17,13 +17,13 @@ rest is a matrix product.
 
 import weakref
 from collections.abc import Sequence
-from functools import lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import F1, F2, F3, I1, I2, Array, apart, cached_property, indices, primitive
+from ...core import (F1, F2, F3, I1, I2, Array, apart, array_cache, cached_property, indices,
+                     primitive)
 from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
 from ...materials.history import AtRest
@@ -42,7 +42,18 @@ class Pattern:
 
     def __init__(self, kind: int, rows: Array, pairs: Array) -> None:
         self.kind, self.rows, self.pairs, self.ns = kind, rows, pairs, rows.shape[1]
-        self.products, self.terms, self.of = _products(rows, pairs)
+        (g, h), size, row = rows, self.ns, rows.ravel()
+        ends = [[s] if g[s] == h[s] else [s, size + s] for s in range(size)]
+        terms = [(*sorted((a, b), key=lambda c: row[c]), q)
+                 for q, (s, t) in enumerate(pairs.T)
+                 for a in ends[s] for b in ends[t] if s < t or a <= b]
+        of, found = (np.sort(x, axis=0) for x in (rows, row[np.transpose(terms)[:2]]))
+        self.products = np.unique(np.concatenate([of, found], axis=1), axis=1).copy()
+        number = {tuple(x): k for k, x in enumerate(self.products.T.tolist())}
+        numbers = [[number[tuple(x)] for x in y.T.tolist()] for y in (found, of)]
+        terms = sorted((p, *x) for p, x in zip(numbers[0], terms))
+        self.terms = np.transpose(np.array(terms, np.int64)).copy()
+        self.of = np.array(numbers[1], np.int64)
 
     @cached_property
     def ends(self) -> tuple[Array, ...]:
@@ -98,39 +109,11 @@ class StrainTables(NamedTuple):
     def kind(self) -> int:
         return self.pattern.kind
 
-    @property
-    def rows(self) -> Array:
-        return self.pattern.rows
 
-    @property
-    def pairs(self) -> Array:
-        return self.pattern.pairs
-
-
-def _products(rows, pairs):
-    (g, h), size = rows, rows.shape[1]
-    ends = [[s] if g[s] == h[s] else [s, size + s] for s in range(size)]
-    row = np.concatenate([g, h])
-    terms = [(*sorted((a, b), key=lambda c: row[c]), q)
-             for q, (s, t) in enumerate(pairs.T)
-             for a in ends[s] for b in ends[t] if s < t or a <= b]
-    of, found = (np.sort(x, axis=0) for x in (np.array([g, h]), row[np.transpose(terms)[:2]]))
-    products = np.unique(np.concatenate([of, found], axis=1), axis=1).copy()
-    number = {tuple(x): k for k, x in enumerate(products.T.tolist())}
-    numbers = [[number[tuple(x)] for x in y.T.tolist()] for y in (found, of)]
-    terms = sorted((p, *x) for p, x in zip(numbers[0], terms))
-    return products, np.transpose(np.array(terms, np.int64)).copy(), np.array(numbers[1], np.int64)
-
-
+@array_cache(64)
 def pattern_of(kind: int, rows: Array, pairs: Array) -> Pattern:
     """The :class:`Pattern` of samples; the same object for equal ones."""
-    return _pattern(kind, rows.shape[1], rows.tobytes(), pairs.tobytes())
-
-
-@lru_cache(64)
-def _pattern(kind, size, rows, pairs):
-    return Pattern(kind, *(np.frombuffer(x, np.int64).reshape(2, -1).copy() for x in (
-        rows, pairs)))
+    return Pattern(kind, rows, pairs)
 
 
 def separated(t: StrainTables) -> StrainTables:
@@ -219,7 +202,7 @@ def points_of(t: StrainTables) -> tuple[Any, ...]:
         return ()
     law = _LAWS[t.law.handle]
     if t.law.kind == HISTORY:
-        return law.functions(t.kind == CABLE)
+        return law.functions(t.pattern.kind == CABLE)
     return (law.point if t.law.kind == POINTWISE else None,)
 
 
@@ -284,26 +267,25 @@ def conserve(law, middle, change, S):
 
 def law_tables(law: Any, owner: Any) -> LawTables:
     """The LawTables of a law; a law in Python is registered while its ``owner`` lives."""
-    one = np.ones(3)
+    base, scale, constants = law, np.ones(3), np.zeros(3)
     if isinstance(law, AtRest):
-        handle = next(_handles)
-        _LAWS[handle] = law.material
-        weakref.finalize(owner, _LAWS.pop, handle, None)
-        constants = np.zeros(3)
-        if law.material.point is not None or law.material.fibre is not None:
-            constants = law.material.constants
-        return LawTables(HISTORY, handle, 0, law.D.copy(), constants, law.scale)
-    if isinstance(law, LinearLaw):
-        return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
-    base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
-    handle, kind, constants = next(_handles), CUSTOM, np.zeros(3)
-    if isinstance(base, PointwiseMaterial) and base.is_pointwise:
-        kind, constants = POINTWISE, np.array(base.constants, dtype=float)
+        kind, base, scale, D = HISTORY, law.material, law.scale, law.D
+        if base.point is not None or base.fibre is not None:
+            constants = base.constants
+    elif isinstance(law, LinearLaw):
+        return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), constants, scale)
+    else:
+        if type(law) is ShearCorrected:
+            base, scale = law.base, law.scale
+        kind = CUSTOM
+        if isinstance(base, PointwiseMaterial) and base.is_pointwise:
+            kind, constants = POINTWISE, base.constants
+        with np.errstate(all="ignore"):
+            D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
+    handle = next(_handles)
     _LAWS[handle] = base
     weakref.finalize(owner, _LAWS.pop, handle, None)
-    with np.errstate(all="ignore"):
-        D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
-    return LawTables(kind, handle, 0, np.array(D), constants, np.array(scale, dtype=float))
+    return LawTables(kind, handle, 0, *(np.array(x, dtype=float) for x in (D, constants, scale)))
 
 
 #: For cables, which have moduli only.
