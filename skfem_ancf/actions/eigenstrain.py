@@ -191,7 +191,6 @@ class EigenStrain(Load):
         return self.beam.kernel.forces_of([factor * T for T in self._stresses],
                                           np.zeros(self.beam.N))
 
-
     def force(self, u: Array) -> Array:
         return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
@@ -219,7 +218,6 @@ class EigenStrain(Load):
         return -sum(float(np.sum(T.T * strain.reshape(-1, strain.shape[2])))
                     for t, T in zip(self.beam.kernel.tables, self.eigen_stresses)
                     if t.law.kind == LINEAR)
-
 
     # fields
 

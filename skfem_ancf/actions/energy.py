@@ -60,7 +60,6 @@ class Density(Load):
     _parts: Sequence[DensityPoints]
     _time = 0.0
 
-
     def factor_and_load(self, t: float | None) -> tuple[float, Load]:
         return self.factor(t), self if t is None else self._with(_time=float(t))
 

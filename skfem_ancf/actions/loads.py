@@ -431,7 +431,6 @@ class Pressure(Load):
     matrix: Any
     _rows: Any
 
-
     def __init__(self, boundary: Place, p: float, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)

@@ -51,7 +51,6 @@ class Choice(NamedTuple):
     reason: str
 
 
-
 class Backend:
     """Runs the kernels of a system. The process counts its work in NumPy: iterations times elements
     and points of contact. As soon as what is done and the next call reach the price, compiled code

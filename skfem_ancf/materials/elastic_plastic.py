@@ -396,7 +396,6 @@ class ElasticPlastic(HistoryMaterial):
         strength = values_of(name, units)[0]["strength"]
         return super().named(name, units, **{"yield_stress": strength, **changes})
 
-
     def __repr__(self) -> str:
         return super().__repr__()[:-1] + f", yield_stress={self.yield_stress:g})"
 

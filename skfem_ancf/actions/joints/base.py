@@ -237,6 +237,5 @@ class IndependentPart(Joint):
     def lost(self, u: Array) -> str:
         return self.joint.lost(u)
 
-
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.slope_entries(times, N))

@@ -299,7 +299,6 @@ class Nodes(Joint):
         return sparse.csr_array((values.ravel(), (np.repeat(i, 3), j.ravel())),
                                 shape=(count, 3 * number))
 
-
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         bound, several = self._thawed(), np.bincount(self.nodes) > 1
         bound.bind(layout)
