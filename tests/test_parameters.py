@@ -90,6 +90,11 @@ class Tip(Item):
     def __init__(self, k):
         self.k = k
 
+    def bind(self, layout):
+        bound = super().bind(layout)
+        bound.dofs = np.arange(layout.N - 12, layout.N)
+        return bound
+
     def energy(self, u, t):
         return self.k / 4 * np.sum(u[-12:-10]**2)**2 + self.k * u[-11]**2
 

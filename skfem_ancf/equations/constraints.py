@@ -301,8 +301,7 @@ class Constraints:
                 joint.mean_entries(v, u, t) for joint in self.joints)).ravel()
         elif what == 6:
             v0, v1, u0 = v[:3 * N].reshape(3, N)
-            for joint, impulse in zip(self.joints, self.multipliers_of(v[3 * N:])):
-                out += joint.mean_turning(u0, u, v0, v1, t, impulse)
+            out += self.mean_turning(u0, u, v0, v1, t, v[3 * N:])
         for joint in self.joints if what in (4, 7, 8) else ():
             part = out[first:first + len(joint.equations)]
             first += len(part)
@@ -330,6 +329,13 @@ class Constraints:
                      for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
             i, j, v = _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
         return i, j, v * (self.free[i] & self.free[j])
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        """The correction of conserving steps for joints that are not quadratic, shape (N,)."""
+        parts = zip(self.joints, self.multipliers_of(multipliers))
+        return sum((joint.mean_turning(u0, u1, v0, v1, t, part) for joint, part in parts),
+                   np.zeros(self.N))
 
     @cached_property
     def _limited(self) -> list[BoundConstraint]:

@@ -46,6 +46,23 @@ def multiply(C, X):
 
 
 @source
+def add_to_nodes(t, first, F, f):
+    """Add the forces of elements, scaled."""
+    m, last, at = len(F), min(t.width, len(t.start) - first), t.start[first:]
+    if len(t.D) > 0:
+        multiply(block(t.D, first), F)
+    for k in range(m):
+        x, v = F[k], f[2 * k + 2:]
+        for e in range(last):
+            v[np.uint64(at[e])] += x[e]
+            v[np.uint64(at[e] + 1)] += x[W + e]
+    x = F[m // 2]
+    for e in range(last):
+        f[np.uint64(at[e])] -= x[e]
+        f[np.uint64(at[e] + 1)] -= x[W + e]
+
+
+@source
 def to_rows(t, first, U, d):
     """d = G U."""
     if len(t.own) == 0:
@@ -357,18 +374,7 @@ def add_forces_of(t, first, X, T, U, B, F, f):
         add_own(block(t.own, first), t.used, len(F), B, F, 1)
     if len(U) > 0 and len(t.K) > 0:
         add_constant(t.coupled, block(t.K, first), block(t.Z, first), U, F)
-    m, last, at = len(F), min(t.width, len(t.start) - first), t.start[first:]
-    if len(t.D) > 0:
-        multiply(block(t.D, first), F)
-    for k in range(m):
-        x, v = F[k], f[2 * k + 2:]
-        for e in range(last):
-            v[np.uint64(at[e])] += x[e]
-            v[np.uint64(at[e] + 1)] += x[W + e]
-    x = F[m // 2]
-    for e in range(last):
-        f[np.uint64(at[e])] -= x[e]
-        f[np.uint64(at[e] + 1)] -= x[W + e]
+    add_to_nodes(t, first, F, f)
 
 
 @apart("StrainTables", I2, F2, F2, F2, F2)
@@ -514,21 +520,13 @@ def place(i, m):
     return (m // 2, a, -1.0) if k == 0 else (k - 1, a, 1.0)
 
 
-@apart("StrainTables", CompiledTables, int, F2, F2, int, int, F1)
-def add_matrices(t, first, w, z, constant, ld, A):
-    """Add the matrices of coefficients to a lower half."""
-    m, n = t.G.shape[1], t.width
-    K, Z = room((m * (m + 1) // 2, 3 * n)), room((m * (m - 1) // 2, n))
-    products(t, first, w, z, K, Z)
-    if constant > 0 and len(t.K) > 0:
-        add(1.0, block(t.K, first), K)
-        add(1.0, block(t.Z, first), Z)
-    if len(t.D) > 0:
-        scale_products(block(t.D, first), K, 1)
-        scale_products(block(t.D, first), Z, 0)
-    last, at = min(W, len(t.start) - first), np.empty(W, np.uint64)
+@apart("StrainTables", I1, int, int, int, F2, F2, F1)
+def add_to_band(start, first, ld, m, K, Z, A):
+    """Add tangents to a lower half."""
+    last = min(W, len(start) - first)
+    at = np.empty(W, np.uint64)
     for e in range(last):
-        at[e] = t.start[first + e] * ld
+        at[e] = start[first + e] * ld
     for j in range(2 * m + 2):
         l, b, sj = place(j, m)
         for i in range(j, 2 * m + 2):
@@ -542,6 +540,21 @@ def add_matrices(t, first, w, z, constant, ld, A):
                 c, y = sign if (k > l) == (a < b) else -sign, Z[high * (high - 1) // 2 + low]
                 for e in range(last):
                     A[at[e] + p] += sign * x[e] + c * y[e]
+
+
+@apart("StrainTables", CompiledTables, int, F2, F2, int, int, F1)
+def add_matrices(t, first, w, z, constant, ld, A):
+    """Add the matrices of coefficients to a lower half."""
+    m, n = t.G.shape[1], t.width
+    K, Z = room((m * (m + 1) // 2, 3 * n)), room((m * (m - 1) // 2, n))
+    products(t, first, w, z, K, Z)
+    if constant > 0 and len(t.K) > 0:
+        add(1.0, block(t.K, first), K)
+        add(1.0, block(t.Z, first), Z)
+    if len(t.D) > 0:
+        scale_products(block(t.D, first), K, 1)
+        scale_products(block(t.D, first), Z, 0)
+    add_to_band(t.start, first, ld, m, K, Z, A)
 
 
 # laws with a history: :class:`~.kernel.ElementsWithHistory` is for NumPy
