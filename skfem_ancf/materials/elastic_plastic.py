@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 #: Places of the constants. From ROWS on there is p, yield stress, slope and stored energy for each
 #: row of a table of hardening but the first.
 E, NU, KINEMATIC, YIELD, SATURATION, RATE, LINEAR, ROWS = range(8)
+#: Places of the history: plastic strains, back stresses, and the plastic strain summed along the
+#: path.
+XX, YY, XY, BACK_XX, BACK_YY, BACK_XY, PATH = range(7)
 #: Newton corrections of a return to the yield surface; the gap at the end over the yield stress, or
 #: over the trial stress, whose round-off it has.
 CORRECTIONS, FEW, CLOSED, ROUGH = 100, 10, 1e-13, 1e-14
@@ -50,7 +53,7 @@ def hardened(c, p):
 @source
 def locked(c, history):
     """Energy that hardening stores: that of the yield stress beyond the first, and kinematic."""
-    p, a, b, d = history[6], history[0], history[1], history[2]
+    p, a, b, d = history[PATH], history[XX], history[YY], history[XY]
     out = 0.5 * c[LINEAR] * p * p
     if c[SATURATION] > 0.0 and c[RATE] > 0.0:
         out = out + c[SATURATION] * (p + np.expm1(-c[RATE] * p) / c[RATE])
@@ -110,12 +113,12 @@ def plane_stress(c, strain, history, dt, S, D, after):
     """Stress, moduli and history of plane stress."""
     # x, y, z are the trial stress less back stress in the components (xx + yy, xx - yy, xy) over
     # sqrt(2), sqrt(2), 1, in which the moduli are diagonal.
-    G, H, p = 0.5 * c[E] / (1.0 + c[NU]), 2.0 / 3.0 * c[KINEMATIC], history[6]
+    G, H, p = 0.5 * c[E] / (1.0 + c[NU]), 2.0 / 3.0 * c[KINEMATIC], history[PATH]
     X, Y, Z = c[E] / (1.0 - c[NU]), 2.0 * G, G
-    a, b = strain[0] - history[0], strain[1] - history[1]
-    x = HALF * (X * (a + b) - history[3] - history[4])
-    y = HALF * (Y * (a - b) - history[3] + history[4])
-    z = Z * (strain[2] - history[2]) - history[5]
+    a, b = strain[0] - history[XX], strain[1] - history[YY]
+    x = HALF * (X * (a + b) - history[BACK_XX] - history[BACK_YY])
+    y = HALF * (Y * (a - b) - history[BACK_XX] + history[BACK_YY])
+    z = Z * (strain[2] - history[XY]) - history[BACK_XY]
     for k in range(len(history)):
         after[k] = history[k]
     plastic = yields(c, x * x / 3.0 + y * y + 2.0 * z * z, p)
@@ -124,13 +127,13 @@ def plane_stress(c, strain, history, dt, S, D, after):
         g, f, K = multiplier(c, plastic, (x * x / 3.0, y * y, 2.0 * z * z), (A, B, C), p)
         x, y, z = x / (1.0 + A * g), y / (1.0 + B * g), z / (1.0 + C * g)
         q, r = HALF * g * x, HALF * g * y
-        after[0] += q / 3.0 + r
-        after[1] += q / 3.0 - r
-        after[2] += 2.0 * g * z
-        after[3] += H * (q + r)
-        after[4] += H * (q - r)
-        after[5] += H * g * z
-        after[6] += ROOT * g * f
+        after[XX] += q / 3.0 + r
+        after[YY] += q / 3.0 - r
+        after[XY] += 2.0 * g * z
+        after[BACK_XX] += H * (q + r)
+        after[BACK_YY] += H * (q - r)
+        after[BACK_XY] += H * g * z
+        after[PATH] += ROOT * g * f
         one, two = 1.0 + H * g, 1.0 - 2.0 / 3.0 * K * g
         h = g / one
         u, v, w = X / (1.0 + X / 3.0 * h), Y / (1.0 + Y * h), Z / (1.0 + 2.0 * Z * h)
@@ -145,13 +148,14 @@ def plane_stress(c, strain, history, dt, S, D, after):
     else:
         D[0], D[1], D[3] = 0.5 * (X + Y), 0.5 * (X - Y), 0.5 * (X + Y)
         D[2], D[4], D[5] = 0.0, 0.0, Z
-    S[0], S[1], S[2] = HALF * (x + y) + after[3], HALF * (x - y) + after[4], z + after[5]
+    S[0], S[1] = HALF * (x + y) + after[BACK_XX], HALF * (x - y) + after[BACK_YY]
+    S[2] = z + after[BACK_XY]
 
 
 @source
 def plane_stress_energy(c, strain, history):
     """Stored energy of plane stress."""
-    a, b, d = strain[0] - history[0], strain[1] - history[1], strain[2] - history[2]
+    a, b, d = strain[0] - history[XX], strain[1] - history[YY], strain[2] - history[XY]
     return 0.5 * c[E] / (1.0 + c[NU]) * (
         (a * a + b * b + 2.0 * c[NU] * a * b) / (1.0 - c[NU]) + 0.5 * d * d) + locked(c, history)
 
@@ -159,10 +163,10 @@ def plane_stress_energy(c, strain, history):
 @source
 def deviators(c, strain, history):
     """Volumetric strain, and elastic stress deviators xx, yy, xy and zz of plane strain."""
-    a, b, z = strain[0] - history[0], strain[1] - history[1], history[0] + history[1]
+    a, b, z = strain[0] - history[XX], strain[1] - history[YY], history[XX] + history[YY]
     G, mean = 0.5 * c[E] / (1.0 + c[NU]), (a + b + z) / 3.0
     return 3.0 * mean, 2.0 * G * (a - mean), 2.0 * G * (b - mean), G * (
-        strain[2] - history[2]), 2.0 * G * (z - mean)
+        strain[2] - history[XY]), 2.0 * G * (z - mean)
 
 
 @source
@@ -170,29 +174,30 @@ def plane_strain(c, strain, history, dt, S, D, after):
     """Stress, moduli and history of plane strain: radial return."""
     G, bulk, H = 0.5 * c[E] / (1.0 + c[NU]), c[E] / (3.0 - 6.0 * c[NU]), 2.0 / 3.0 * c[KINEMATIC]
     volume, x, y, s, z = deviators(c, strain, history)
-    x, y, s, z = x - history[3], y - history[4], s - history[5], z + history[3] + history[4]
+    x, y, s = x - history[BACK_XX], y - history[BACK_YY], s - history[BACK_XY]
+    z = z + history[BACK_XX] + history[BACK_YY]
     square = x * x + y * y + 2.0 * s * s + z * z
     for k in range(len(history)):
         after[k] = history[k]
     one, n = 1.0 + 0.0 * square, 0.0 * square
-    plastic = yields(c, square, history[6])
+    plastic = yields(c, square, history[PATH])
     if somewhere(plastic):
         A = 2.0 * G + H
-        g, f, K = multiplier(c, plastic, (square,), (A,), history[6])
-        after[6] += ROOT * g * f
+        g, f, K = multiplier(c, plastic, (square,), (A,), history[PATH])
+        after[PATH] += ROOT * g * f
         g = g / (1.0 + A * g)  # flow is this times the trial stress
-        after[0] += g * x
-        after[1] += g * y
-        after[2] += 2.0 * g * s
-        after[3] += H * g * x
-        after[4] += H * g * y
-        after[5] += H * g * s
+        after[XX] += g * x
+        after[YY] += g * y
+        after[XY] += 2.0 * g * s
+        after[BACK_XX] += H * g * x
+        after[BACK_YY] += H * g * y
+        after[BACK_XY] += H * g * s
         one = 1.0 - 2.0 * G * g
         n = where(plastic, one - 1.0 + 1.0 / (1.0 + (K + c[KINEMATIC]) / (3.0 * G)), 0.0)
         n *= 2.0 * G / where(plastic, square, 1.0)
-    S[0] = bulk * volume + history[3] + one * x
-    S[1] = bulk * volume + history[4] + one * y
-    S[2] = history[5] + one * s
+    S[0] = bulk * volume + history[BACK_XX] + one * x
+    S[1] = bulk * volume + history[BACK_YY] + one * y
+    S[2] = history[BACK_XY] + one * s
     a, b = bulk + 4.0 / 3.0 * G * one, bulk - 2.0 / 3.0 * G * one
     D[0], D[1], D[2] = a - n * x * x, b - n * x * y, -n * x * s
     D[3], D[4], D[5] = a - n * y * y, -n * y * s, G * one - n * s * s
@@ -209,29 +214,29 @@ def plane_strain_energy(c, strain, history):
 @source
 def fibre(c, strain, history, dt, S, D, after):
     """Stress, modulus and history of a fibre in uniaxial stress."""
-    H, x = c[KINEMATIC], c[E] * (strain[0] - history[0]) - history[3]
+    H, x = c[KINEMATIC], c[E] * (strain[0] - history[XX]) - history[BACK_XX]
     square = 2.0 / 3.0 * x * x
     for k in range(len(history)):
         after[k] = history[k]
-    plastic = yields(c, square, history[6])
+    plastic = yields(c, square, history[PATH])
     if somewhere(plastic):
         A = 2.0 / 3.0 * (c[E] + H)
-        g, _, K = multiplier(c, plastic, (square,), (A,), history[6])
+        g, _, K = multiplier(c, plastic, (square,), (A,), history[PATH])
         flow = 2.0 / 3.0 * g / (1.0 + A * g) * x
-        after[0] += flow
-        after[1] -= 0.5 * flow
-        after[3] += H * flow
-        after[6] += np.abs(flow)
+        after[XX] += flow
+        after[YY] -= 0.5 * flow
+        after[BACK_XX] += H * flow
+        after[PATH] += np.abs(flow)
         D[0] = where(plastic, c[E] * (K + H) / (c[E] + K + H), c[E])
     else:
         D[0] = c[E]
-    S[0] = c[E] * (strain[0] - after[0])
+    S[0] = c[E] * (strain[0] - after[XX])
 
 
 @source
 def fibre_energy(c, strain, history):
     """Stored energy of a fibre."""
-    elastic = strain[0] - history[0]
+    elastic = strain[0] - history[XX]
     return 0.5 * c[E] * elastic * elastic + locked(c, history)
 
 
@@ -239,8 +244,9 @@ def fibre_energy(c, strain, history):
 def across_width(history):
     """A history with zz in place of yy, as :func:`plane_stress` has it: plastic strains have no
     trace, and of the back stress that of yy is zero, as stress is."""
-    a, b = history[0], history[3] - history[4]
-    return a, -a - history[1], 0.0 * a, b, -history[3] - 2.0 * history[4], 0.0 * b, history[6]
+    a, b = history[XX], history[BACK_XX] - history[BACK_YY]
+    return (a, -a - history[YY], 0.0 * a, b, -history[BACK_XX] - 2.0 * history[BACK_YY], 0.0 * b,
+            history[PATH])
 
 
 @source
@@ -251,8 +257,8 @@ def plane_strain_fibre(c, strain, history, dt, S, D, after):
     stress, moduli = np.empty((3, *size)), np.empty((6, *size))
     plane_stress(c, (e, 0.0 * e, 0.0 * e), across_width(history), dt, stress, moduli, after)
     S[0], D[0] = stress[0], moduli[0]
-    after[1], after[4] = -after[0] - after[1], -(after[3] + after[4]) / 3.0
-    after[3] += after[4]
+    after[YY], after[BACK_YY] = -after[XX] - after[YY], -(after[BACK_XX] + after[BACK_YY]) / 3.0
+    after[BACK_XX] += after[BACK_YY]
 
 
 @source
@@ -422,14 +428,14 @@ class ElasticPlastic(HistoryMaterial):
 
     def out_of_plane(self, strain: Array, history: Array, stress: Array) -> tuple[Array, Array]:
         e, S = super().out_of_plane(strain, history, stress)
-        flow = history[0] + history[1]
+        flow = history[XX] + history[YY]
         return (e - flow, S) if self.plane == "stress" else (e, S + self.E * flow)
 
     def outputs(self, strain: Array, history: Array, stress: Array) -> dict[str, Array]:
-        a, b, c = stress - history[3:6]
+        a, b, c = stress - history[BACK_XX:PATH]
         z = self.out_of_plane(strain, history, stress)[1]
         if self.plane == "strain":
-            z = z + history[3] + history[4]
+            z = z + history[BACK_XX] + history[BACK_YY]
         size = np.sqrt(0.5 * ((a - b) ** 2 + (b - z) ** 2 + (z - a) ** 2) + 3.0 * c * c)
-        return {"plastic_strain": history[6], "dissipated": self.yield_stress * history[6],
-                "yield_ratio": size / self.yield_at(history[6])}
+        return {"plastic_strain": history[PATH], "dissipated": self.yield_stress * history[PATH],
+                "yield_ratio": size / self.yield_at(history[PATH])}
