@@ -14,8 +14,8 @@ from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, 
 from skfem.helpers import ddot, sym_grad
 
 from skfem_ancf import (Beam, BodyContact, Domain, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, MeshBeam, ModelWarning, RigidBody, Scene,
-                        StVenantKirchhoff)
+                        ElementBeamCable, Frame, InputError, MeshBeam, ModelWarning, RigidBody,
+                        Scene, StVenantKirchhoff)
 from skfem_ancf.actions.bound import recalled
 from skfem_ancf.actions.contact import contacts, kernels, pairs
 from skfem_ancf.actions.contact.tables import is_clear
@@ -76,10 +76,28 @@ def test_members_that_meet_unjoined_are_said_to(join, right):
     with warnings.catch_warnings():
         warnings.simplefilter("error", ModelWarning)
         assert crossed(join, right).system
-    with pytest.warns(ModelWarning, match=r"beam 0 meets beam 1 near \(0.49, 0\) in the ref"):
+    with pytest.warns(ModelWarning, match=r"beam 0 meets beam 1 near \(0.5, 0\) in the ref"):
         assert crossed(right=right).system
     with pytest.warns(ModelWarning, match="nothing joins them there"):  # joined elsewhere
         assert crossed(lambda s: s.spring(1e5, [(0, "right"), (1, "left")]), right).system
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_long_elements_that_are_hinged_inside_are_no_crossing(n):
+    beams = [line(1.0, n, 0.005), line(0.8, n, 0.005, (0.3, 0.4), angle=-0.5 * np.pi)]
+    scene = Scene(*beams).pin("left", 0).gravity((0, -9.81)).contact("all")
+    scene.hinge((0.3, 0.0))
+    history = scene.integrate(0.02, 2e-3)
+    assert not len(history.state(-1).contact())
+    assert np.ptp(history.total_energy) < 1e-10 * np.abs(history.kinetic_energy).max()
+
+
+def test_a_frame_of_one_element_a_line_may_touch_itself():
+    """At a node lines overlap within their heights, and are joined there."""
+    frame = Frame.from_lines([(0, 0), (1, 0), (2, 0), (1, 1)], [(0, 1), (1, 2), (1, 3)], elements=1,
+                             element=ElementBeamCable(3), material=STEEL, width=0.02, height=0.02)
+    frame.clamp(0).contact("all", self_contact=True)
+    assert not len(frame.point_force((0, -100.0), at=2).solve_static().contact())
 
 
 def test_ends_of_a_ring_that_meet_unjoined_are_said_to():

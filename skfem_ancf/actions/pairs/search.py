@@ -19,8 +19,9 @@ from .facets import Facets
 #: Distance of seeds along facets, largest number on a facet; distances in heights for which a list
 #: of candidates is enough that are tried where nothing is near.
 SEEDS, MOST, SKINS = 1.2, 10, (2.0, 5.0, 12.0, 30.0, 75.0)
-#: Distance of axes that are joined, in heights; parts of an element in which they are searched.
-JOINED, FINE = 1e-3, 8
+#: Distance of axes that are joined, in heights; parts of an element in which they are searched,
+#: and in which what is in a body is, at most.
+JOINED, FINE, MOST_FINE = 1e-3, 8, 64
 #: No candidates.
 _NONE = np.zeros(0, np.int64)
 NOBODY = Candidates(_NONE, _NONE, np.zeros(0), _NONE)
@@ -338,24 +339,30 @@ class Search:
     def _joined(self, solids):
         """Chains and places on them, two each, where axes meet in the reference configuration."""
         # Or where axes are in ``solids``, pairs of a member's number and a function of places.
-        ends, chains, s, _ = axes = self._axes(np.zeros(self.surfaces.facets.dofs.max() + 1), FINE)
-        out, f, near = [], self.surfaces.facets, JOINED * self.height
+        f, out, near = self.surfaces.facets, [], JOINED * self.height
+        zero, longest = np.zeros(f.dofs.max() + 1), float(f.spans.max()) / (APART * self.height)
+        fine = int(np.clip(np.ceil(longest), FINE, MOST_FINE)) if solids else FINE
+        ends, chains, s, _ = axes = self._axes(zero, fine)
         for k, contains in solids:
             inside = contains(ends.mean(axis=1)) | contains(ends[:, 0]) | contains(ends[:, 1])
             other = f.chains[np.argmax(f.members == k)]
             out += [(i, a, other, 0.0) for i, a in zip(chains[inside], s[inside])]
         if len(ends):
-            i, j = self._close(axes, near)
-            # the least distance of segments: 0 where they cross, or that of an end from the other
-            apart = np.where(crossing(ends[i], ends[j]), 0.0, np.inf)
-            for p, q in ((ends[i], ends[j]), (ends[j], ends[i])):
-                path = q[:, 1] - q[:, 0]
+            i, j = pairs = self._close(axes, near)
+            # where two segments are closest, from 0 to 1: at a crossing, or at an end of one
+            met, *at = crossing(ends[i], ends[j])
+            apart, at = np.where(met, 0.0, np.inf), np.where(met, at, 0.5)
+            for one, other in ((0, 1), (1, 0)):
+                start, path = ends[pairs[other], 0], np.diff(ends[pairs[other]])[:, 0]
                 for k in (0, 1):
-                    d = p[:, k] - q[:, 0]
+                    d = ends[pairs[one], k] - start
                     share = np.clip(dot(path, d) / np.abs(path) ** 2, 0.0, 1.0)
-                    apart = np.minimum(apart, np.abs(d - share * path))
-            for a, b in zip(i[apart < near], j[apart < near]):
-                out += [(chains[a], s[a], chains[b], s[b]), (chains[b], s[b], chains[a], s[a])]
+                    gap = np.abs(d - share * path)
+                    less, apart = gap < apart, np.minimum(gap, apart)
+                    at[one][less], at[other][less] = k, share[less]
+            i, j = pairs = np.array(pairs)[:, apart < near]
+            r, q = s[pairs] + (at[:, apart < near] - 0.5) * np.abs(np.diff(ends[pairs])[..., 0])
+            out += [*zip(chains[i], r, chains[j], q), *zip(chains[j], q, chains[i], r)]
         # without those of nearly equal places
         h = self.height
         return list({(i, round(2.0 * s / h), j, round(2.0 * r / h)): (i, s, j, r)
@@ -396,11 +403,12 @@ class Search:
         if not len(ends):
             return None
         i, j = self._close(axes, 0.0)
-        met = crossing(ends[i], ends[j])
-        i, j, apart = i[met], j[met], 2.0 * APART * self.height
+        met = crossing(ends[i], ends[j])[0]
+        i, j = i[met], j[met]
+        apart = 2.0 * APART * self.height + 0.5 * np.abs(np.diff(ends)[:, 0])
         for a, r, b, q in self.joined:
-            known = (chains[i] == a) & (chains[j] == b) & (np.abs(s[i] - r) < apart) & (
-                np.abs(s[j] - q) < apart)
+            known = (chains[i] == a) & (chains[j] == b) & (np.abs(s[i] - r) < apart[i]) & (
+                np.abs(s[j] - q) < apart[j])
             i, j = i[~known], j[~known]
         return ends[i[0]].mean() if len(i) else None
 
@@ -452,10 +460,11 @@ class Search:
         return None
 
 
-def crossing(a: Array, b: Array) -> Array:
-    """True where segments a and b (n, 2) cross, at an angle that is no round-off."""
+def crossing(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """True where segments a and b (n, 2) cross, at an angle that is no round-off, and where on
+    them, from 0 to 1."""
     u, v, w = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0], b[:, 0] - a[:, 0]
     size = cross(u, v)
     size = np.where(np.abs(size) > PARALLEL * np.abs(u) * np.abs(v), size, np.nan)
     s, r = cross(w, v) / size, cross(w, u) / size
-    return (s > 0.0) & (s < 1.0) & (r > 0.0) & (r < 1.0)
+    return (s > 0.0) & (s < 1.0) & (r > 0.0) & (r < 1.0), s, r
