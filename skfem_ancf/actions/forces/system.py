@@ -48,6 +48,16 @@ class Forces:
     _in_border = NONE > 0
     border_entries = _entries
     _border: Any = NONE, NONE
+    #: Of a scene without elements.
+    masses: Any = ()
+    elements = custom = changing = remembering = parts = blocks = _springs = _slices = masses
+    _paired: Any = masses
+    _searches = _paired
+    pairs: Any = NONE
+    rows = size = paired = 0
+    couples_far = resists = False
+    symmetric = True
+    contacts = Contacts((), 0)
     #: Entries of the last tangent of a step: rows, columns and values. Those of the last tangent of
     #: changing elements, and what they were computed from.
     kept: Any = NONE, NONE, np.zeros(0)
@@ -56,9 +66,12 @@ class Forces:
     def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
         self._N, self._bandwidth, self.border_rows = N, bandwidth, np.zeros((0, N))
-        self.masses: Any = [e for e in elements if e.mass_entries() is not None]
-        self.elements: Any = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
-                              for e in elements]
+        if not elements:
+            self.clear, self.rested = np.zeros(SEEN + 2 * N), nowhere(N)
+            return
+        self.masses = [e for e in elements if e.mass_entries() is not None]
+        self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
+                         for e in elements]
         self._sort()
         n = len(self.parts)
         # of each element its links, the rows of their components in the vectors (those of the parts
@@ -67,9 +80,9 @@ class Forces:
         for k, part in enumerate(self.parts):
             a, b = np.divmod(np.arange(16), 4) if part.kind == TORSION else FIRST
             blocks.append(((part.d, part.e), k + n * np.arange(4), a, b, k + n * (4 * a + b)))
-        self.blocks: list[Any] = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
+        self.blocks = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
         row, at = 4 * n, 16 * n
-        self._slices = list[Any]()
+        self._slices = []
         for element in self.custom:
             m = 2 * len(element.links)
             dense = element.entries is None
@@ -132,7 +145,7 @@ class Forces:
         self._paired = [(e, at) for e, at in self.changing if hasattr(e, "broad_search")]
         self._searches = [e.broad_search.fresh() if fresh else e.broad_search
                           for e, _ in self._paired]
-        self.pairs: Any = tuple(
+        self.pairs = tuple(
             search.tables._replace(used=at[::2] // 2, history=e.values)
             for search, (e, at) in zip(self._searches, self._paired)) or NONE
         self.paired = len(self.pairs)
