@@ -82,6 +82,19 @@ def test_members_that_meet_unjoined_are_said_to(join, right):
         assert crossed(lambda s: s.spring(1e5, [(0, "right"), (1, "left")]), right).system
 
 
+def test_a_beam_that_ends_in_a_body_is_joined_by_one_weld_to_it():
+    """Also where its elements enter the body, far from the weld."""
+    beam, side = line(1.0, 8, 0.02), np.array([-0.3, 0.3, 0.3, -0.3])
+    body = RigidBody(1.0, 0.1, (1.0, 0.0), outline=np.column_stack([side, [-0.1, -0.1, 0.1, 0.1]]))
+    scene = Scene(beam, body).clamp("left", 0).obstacle(Line((0, -1))).contact("all")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ModelWarning)
+        scene.weld((0, "right"), (1, (1.0, 0.0)))
+        assert scene.system
+    with pytest.warns(ModelWarning, match="beam 0 meets the rigid body 1 near"):
+        assert Scene(beam, body).clamp("left", 0).contact("all").system
+
+
 @pytest.mark.parametrize("n", [1, 2])
 def test_long_elements_that_are_hinged_inside_are_no_crossing(n):
     beams = [line(1.0, n, 0.005), line(0.8, n, 0.005, (0.3, 0.4), angle=-0.5 * np.pi)]

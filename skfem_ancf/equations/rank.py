@@ -59,10 +59,16 @@ class Block(NamedTuple):
     places: Array  # their positions in a flat array of shape (g, k, c)
 
 
+def linked(rows: Array, columns: Array, m: int, n: int) -> tuple[int, Array]:
+    """How many groups the rows and columns of a matrix (m, n) are linked to by entries (k,), and
+    the group of each, (m + n,)."""
+    links = sparse.coo_array((np.ones(len(rows)), (rows, m + columns)), (m + n, m + n))
+    return connected_components(links, directed=False)
+
+
 def blocks(rows: Array, columns: Array, m: int, n: int) -> list[Block]:
     """Independent groups of the rows of a matrix (m, n) with entries (k,)."""
-    links = sparse.coo_array((np.ones(len(rows)), (rows, m + columns)), (m + n, m + n))
-    number, group = connected_components(links, directed=False)
+    number, group = linked(rows, columns, m, n)
     (all_rows, row), (all_columns, column) = (_members(x, number) for x in (group[:m], group[m:]))
     shape = np.array([[len(x) for x in all_of] for all_of in (all_rows, all_columns)]).T
     out = []

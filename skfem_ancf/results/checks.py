@@ -5,8 +5,6 @@ from math import atan, sqrt
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..actions.contact.contacts import YIELDS
 from ..actions.joints.weld import PrescribedDisplacement
@@ -15,6 +13,7 @@ from ..beam.kinematics import tangents
 from ..core import ModelWarning, StabilityWarning, warn
 from ..equations.evaluation import RANGE
 from ..equations.mobility import who
+from ..equations.rank import linked
 from ..equations.stability import response
 from ..materials.base import LinearLaw
 from ..recovery.grids import values_of_domain
@@ -209,16 +208,14 @@ def warn_of_meetings(system: Any) -> None:
              for met in e.broad_search.meetings()]
     if not found:
         return
-    # a graph of DOFs and what connects them: equations, the ground, force elements
+    # DOFs that equations, the ground or force elements link
     rows, columns, _ = system.constraints.slopes
-    others = [system.constraints.fixed, *(np.concatenate([link.dofs.ravel() for link in e.links])
-                                          for e in elements if not hasattr(e, "broad_search"))]
+    others = [system.constraints.fixed, *(
+        e.all_dofs for e in elements if len(e.links) and not hasattr(e, "broad_search"))]
     first = rows.max(initial=-1) + 1
     rows = np.append(rows, np.repeat(first + np.arange(len(others)), list(map(len, others))))
-    size = system.N + first + len(others)
-    group = connected_components(sparse.coo_array(
-        (np.ones(len(rows)), (np.concatenate([columns, *others]), system.N + rows)),
-        (size, size)), directed=False)[1]
+    m = first + len(others)
+    group = linked(rows, np.concatenate([columns, *others]), m, system.N)[1][m:]
     told = set()
     for contact, x, ((i, a), (j, b)) in found:
         one, other = (group[2 * contact.dofs[at][:, None] + (0, 1)] for at in (a, b))

@@ -462,14 +462,14 @@ def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
         largest = np.abs(system.internal_force(u, None, state.load)
                          * c.coordinate_sizes).max() / system.size
         contacts = system.forces.contacts
-        for (_, group), (_, x, push, _, gap, *_) in zip(
-                contacts.groups, contacts.pushes(u, None, state.load)):
+        for (_, group), push in zip(contacts.groups, contacts.pushes(u, None, state.load)):
             i = group.first + 2 * np.arange(len(group.weights))[:, None]
             # a point that supports hold can neither lift nor press
             moves = np.hypot(*(np.sum(group.weights * soft[i + k], axis=0) for k in (0, 1)))
-            at = (np.abs(gap) < TOUCH * group.height) & (np.hypot(*push) <= TOUCH * largest) & (
-                moves > HELD * moves.max())
-            refuse_any(at, "a point just touches an obstacle, at {:.6g}: take another load", x)
+            at = (np.abs(push.gap) < TOUCH * group.height) & (
+                np.hypot(*push.force) <= TOUCH * largest) & (moves > HELD * moves.max())
+            refuse_any(at, "a point just touches an obstacle, at {:.6g}: take another load",
+                       push.points)
     return found[:-1]
 
 

@@ -71,6 +71,17 @@ class Group(NamedTuple):
     largest_factor: float
 
 
+class Push(NamedTuple):
+    """What an obstacle does to the points of a group."""
+
+    points: Array  # (2, n)
+    force: Array  # on each, (2, n)
+    pressure: Array  # with that of damping, (n,)
+    gap: Array  # (n,)
+    touches: Array  # True for points in contact, (n,)
+    held: Array  # and where friction holds them, (n,)
+
+
 class Contacts:
     """The obstacles of a scene: its force elements with ``groups``. Positions are relative to
     ``origin``, the middle of the bodies, to reduce round-off in friction. Arguments are
@@ -373,42 +384,39 @@ class Contacts:
                    np.cumsum([pair.offsets.size for pair in pairs]))
 
     def pushes(self, u: Array, v: Array | None, t: float, start: Array | None = None,
-               span: float = 0.0) -> list[tuple[Any, ...]]:
+               span: float = 0.0) -> list[Push]:
         """Contact forces, in statics without velocities; means of a step from ``start`` (N,)."""
-        # For each group its obstacle's number, points (2, n), forces (2, n), pressures and gaps
-        # (n,), which points touch, and which of them friction holds.
         if self.moving or self.custom:
             self.put(t - 0.5 * span, span, self.tables.poses)
         same, out = start is None, []
         middle, rate = (u, v) if start is None else (0.5 * (u + start), (u - start) / span)
-        for k, (which, group) in enumerate(self.groups):
-            pair, at = self.tables.pairs[k], np.arange(len(group.first))
+        for pair, (_, group) in zip(self.tables.pairs, self.groups):
+            at = np.arange(len(group.first))
             found, R, K = project(pair, NOW if same else END, u, at), np.zeros(
                 (4, at.size)), np.zeros((16, at.size))
             touch, _ = touch_of(pair, same, found if same else project(pair, BEGIN, start, at),
                                 found, at)
-            r, normal = response(pair, same, touch), 0.0
+            r, lost = response(pair, same, touch), 0.0
             if rate is not None and group.law.damping > 0.0:
                 there, rates = project(pair, NOW, middle, at), np.empty((4, at.size))
                 set_rates(pair, rate, at, rates)
                 pressed, spot = touch_of(pair, True, there, there, at)
                 damp(pair, 0.0, pressed, spot, rates, R, K)
-                normal = np.sum(R[:2] * pressed.gap[:2], axis=0)
+                lost = np.sum(R[:2] * pressed.gap[:2], axis=0)
             add_resistance(touch, r, R)
             held = np.abs(r.friction) < (1.0 - SEEN) * group.law.friction * r.pressure
-            out.append((which, np.array([found.surface.real, found.surface.imag])
-                        + self.origin[:, None], -R[:2], (r.pressure - normal) / group.areas,
-                        found.gap, r.pressure > 0.0, held))
+            x = np.array([found.surface.real, found.surface.imag]) + self.origin[:, None]
+            out.append(Push(x, -R[:2], (r.pressure - lost) / group.areas, found.gap,
+                            r.pressure > 0.0, held))
         return out
 
     def slipping(self, u: Array, t: float) -> list[Any]:
         """The obstacles at which points are at the limit of friction, in statics."""
         out = []
-        for (_, group), (k, _, _, pressure, _, _, held) in zip(
-                self.groups, self.pushes(u, None, t)):
-            one, normal = self.obstacles[k], pressure * group.areas
+        for (which, group), push in zip(self.groups, self.pushes(u, None, t)):
+            one, normal = self.obstacles[which], push.pressure * group.areas
             pressed = normal > SEEN * normal.max(initial=0.0)
-            if one.friction > 0.0 and one not in out and not np.all(held[pressed]):
+            if one.friction > 0.0 and one not in out and not np.all(push.held[pressed]):
                 out.append(one)
         return out
 

@@ -132,15 +132,14 @@ def _touching(state, forces, start, span, known, member):
     """Contact points, forces, pressures, gaps, sticking and the least gap of each group of points
     of an obstacle, then of bodies that touch each other, on both sides."""
     contacts, pushes = _pushes(state, start, span)
-    for (_, group), (k, x, force, pressure, gap, touch, sticks) in pushes:
-        one, first = contacts.obstacles[k], int(group.first[0])
+    for (k, group), push in pushes:
+        one, first, on = contacts.obstacles[k], int(group.first[0]), push.touches
         if not any(one is other for other in known) or (
                 member is not None and not state.system.slices[member].start <= first < (
                     state.system.slices[member].stop)):
             continue
-        pressure = _balanced(group, pressure, touch)
-        yield (x[:, touch], force[:, touch], pressure[touch], gap[touch], sticks[touch],
-               float(gap.min()))
+        yield (push.points[:, on], push.force[:, on], _balanced(group, push.pressure, on)[on],
+               push.gap[on], push.held[on], float(push.gap.min()))
     for element, at in forces.changing:
         if not hasattr(element, "look") or not any(element.same(other) for other in known):
             continue
@@ -156,12 +155,12 @@ def _touching(state, forces, start, span, known, member):
 def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, float, Array]]:
     """Forces of contact on a beam, whose DOFs are given: element, xi, and nodal force (nb, 2)."""
     u, out, (forces, start, span) = np.array(state.u), [], _step_of(state)
-    for (_, group), (_, _, force, *_) in _pushes(state, start, span)[1]:
+    for (_, group), push in _pushes(state, start, span)[1]:
         if not dofs.start <= group.first[0] < dofs.stop:
             continue
         m, ne, xi = group.points, group.elements - 2, _along_elements(group)
-        for k in np.flatnonzero(np.any(force, axis=0)).tolist():
-            e, F = k // m, force[:, k]
+        for k in np.flatnonzero(np.any(push.force, axis=0)).tolist():
+            e, F = k // m, push.force[:, k]
             e, at = (e, xi[k]) if e < ne else (0, 0.0) if e == ne else (ne - 1, 1.0)
             nodal = np.outer(group.weights[:, k], F)
             if len(group.slopes):  # beside the axis of a cable, by the rotation of its tangent

@@ -19,9 +19,8 @@ from .facets import Facets
 #: Distance of seeds along facets, largest number on a facet; distances in heights for which a list
 #: of candidates is enough that are tried where nothing is near.
 SEEDS, MOST, SKINS = 1.2, 10, (2.0, 5.0, 12.0, 30.0, 75.0)
-#: Distance of axes that are joined, in heights; parts of an element in which they are searched,
-#: and in which what is in a body is, at most.
-JOINED, FINE, MOST_FINE = 1e-3, 8, 64
+#: Distance of axes that are joined, in heights; parts of an element in which they are searched.
+JOINED, FINE = 1e-3, 8
 #: No candidates.
 _NONE = np.zeros(0, np.int64)
 NOBODY = Candidates(_NONE, _NONE, np.zeros(0), _NONE)
@@ -340,9 +339,7 @@ class Search:
         """Chains and places on them, two each, where axes meet in the reference configuration."""
         # Or where axes are in ``solids``, pairs of a member's number and a function of places.
         f, out, near = self.surfaces.facets, [], JOINED * self.height
-        zero, longest = np.zeros(f.dofs.max() + 1), float(f.spans.max()) / (APART * self.height)
-        fine = int(np.clip(np.ceil(longest), FINE, MOST_FINE)) if solids else FINE
-        ends, chains, s, _ = axes = self._axes(zero, fine)
+        ends, chains, s, _ = axes = self._axes(np.zeros(f.dofs.max() + 1), FINE)
         for k, contains in solids:
             inside = contains(ends.mean(axis=1)) | contains(ends[:, 0]) | contains(ends[:, 1])
             other = f.chains[np.argmax(f.members == k)]
@@ -381,21 +378,28 @@ class Search:
 
     def meetings(self) -> Iterator[tuple[complex, list[tuple[int, Array]]]]:
         """Where parts are taken for joined: the place, and members and DOFs of both."""
-        f, told = self.surfaces.facets, set[tuple[int, ...]]()
-        for spot in self.joined:
-            parts, r = [], spot[1]
-            for chain, s in (spot[:2], spot[2:]):
-                e = np.flatnonzero(f.chains == chain)
-                near = np.abs(s - f.places[e] - 0.5 * f.spans[e]) <= 0.5 * f.spans[e] + self.height
-                axial = f.spans[e] > 0.0  # a body has none
-                parts.append(e[near & axial] if axial.any() else e)
-            if (known := tuple(sorted(int(e[0]) for e in parts))) not in told:
-                told.add(known)
-                e, off = parts[0], np.abs(r - f.places[parts[0]] - 0.5 * f.spans[parts[0]])
-                e = e[off <= off.min() + JOINED * self.height]  # on both sides of the axis
-                at = self.surfaces.along(e, np.clip(2.0 * (r - f.places[e]) / f.spans[e] - 1.0,
-                                                    -1.0, 1.0), 0, np.zeros(f.dofs.max() + 1))
-                yield at.mean(), [(int(f.members[e[0]]), np.unique(f.dofs[e])) for e in parts]
+        # each place of two axes once, and all of an axis in a body together
+        f, spots = self.surfaces.facets, dict[Any, list[Any]]()
+        axial = f.spans > 0.0
+        axes = set(f.chains[axial].tolist())
+        for a, r, b, q in self.joined:
+            if b not in axes:
+                spots.setdefault((a, b), []).append(r)
+            elif (a, r) <= (b, q):
+                spots[a, b, r, q] = [r]
+
+        def of_chain(chain: int, places: Sequence[float]) -> Array:  # those near places
+            off = np.abs(np.subtract.outer(f.places + 0.5 * f.spans, places)).min(axis=1)
+            return np.flatnonzero((f.chains == chain) & axial & (
+                off <= 0.5 * f.spans + self.height))
+
+        for (a, b, *at), places in spots.items():
+            parts = [of_chain(a, places), of_chain(b, at[1:]) if at else np.flatnonzero(
+                f.chains == b)]
+            e = of_chain(a, places[:1])
+            zeta = np.clip(2.0 * (places[0] - f.places[e]) / f.spans[e] - 1.0, -1.0, 1.0)
+            x = self.surfaces.along(e, zeta, 0, np.zeros(f.dofs.max() + 1))
+            yield x.mean(), [(int(f.members[e[0]]), np.unique(f.dofs[e])) for e in parts]
 
     def crossed(self, z: Array) -> complex | None:
         """A place where axes cross, or None."""
